@@ -1,4 +1,4 @@
-"""Text for a terminal at the end of `new`: what is proposed, and what is to be settled first.
+"""A proposal of `new` in words: what is proposed and why, and what is to be settled first.
 
 The reasons of a proposal's values say what has to be settled in clauses that begin with words in
 capitals, such as NOT MASKED or LONG. They are one list here, and stand in the design file beside
@@ -10,8 +10,10 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
+from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.proposed_target import area_in_mm2
 from chamberopt.common.errors import one_line
@@ -32,41 +34,140 @@ KINDS = {"bore": "the part itself, out through a wall"}  # of holders, in words
 MINUTE, HOUR = 60.0, 3600.0  # s
 
 
-class _Row(NamedTuple):
-    """What is told of a proposal under one name: its value, and the values whose reasons follow."""
+@dataclass(frozen=True)
+class Row:
+    """What is told of a proposal under one name: its value, and the reasons of that value."""
 
     name: str
     value: str
-    keys: tuple[str, ...]
+    reasons: tuple[str, ...]
 
 
-def proposal_end(made: Proposal, left_out: Sequence[LeftOut], verbose: bool) -> list[str]:
-    """Return the end of the command that proposed a design: a sentence, its values, what to settle.
+@dataclass(frozen=True)
+class Matter:
+    """What is to be settled before a proposal is built.
+
+    Attributes:
+        mark: its words in capitals, with which its reason in the design file begins; or "".
+        text: the rest of its sentence, from the first character after the mark.
+    """
+
+    mark: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A surface that could be peened instead.
+
+    Attributes:
+        name: the value for --target.
+        text: its area, and its number of faces.
+        place: a place on it [mm], in the frame of the part's file; "" for one that the file names.
+        alone: the names of its single faces, if they are few.
+        is_target: whether it is the proposed target.
+    """
+
+    name: str
+    text: str
+    place: str
+    alone: str
+    is_target: bool
+
+
+@dataclass(frozen=True)
+class ProposalInWords:
+    """A proposal in words, for a terminal and for the page.
+
+    Attributes:
+        sentence: what is proposed.
+        rows: the proposed values with their reasons, in the order in which a shop asks.
+        matters: what is to be settled before it is built.
+        choices: surfaces to choose a target from.
+    """
+
+    sentence: str
+    rows: tuple[Row, ...]
+    matters: tuple[Matter, ...]
+    choices: tuple[Choice, ...]
+
+
+def proposal_in_words(made: Proposal, left_out: Sequence[LeftOut]) -> ProposalInWords:
+    """Return a proposal in words.
 
     Args:
         left_out: what may be left out of the target, or is peened beside it.
+    """
+    rows, settle = [], []
+    for name, value, keys in _rows(made):
+        reasons: list[str] = []
+        for key in keys:
+            reason = one_line(made.reasons.get(key, ""))  # its beginning may be the row's value
+            why, first = clauses(re.sub(f"^{re.escape(value)}[:;] ", "", reason))
+            settle += first
+            if why and why != [value]:
+                of = f"{in_words(key.rpartition('.')[2])}: " if key.endswith("_mm") else ""
+                reasons.append(f"{of}{'; '.join(why)}")
+        rows.append(Row(name, value, tuple(reasons)))
+    for one in left_out:
+        keys_of = " and ".join(f"part.target.{key}" for key in one.keys)
+        leave = f": {keys_of} in the design leave it out" if keys_of else ""
+        settle.append(f"{one.text}{leave}")
+    target = chosen_triangles(made.mesh, made.design.part.target)
+    return ProposalInWords(
+        _sentence(made),
+        tuple(rows),
+        tuple(_matter(text) for text in settle),
+        tuple(_choice(one, bool((one.triangles == target).all())) for one in made.known),
+    )
+
+
+def proposal_lines(told: ProposalInWords, verbose: bool) -> list[str]:
+    """Return a proposal in lines of at most WIDTH columns.
+
+    Args:
         verbose: what is simulated is told too, and all surfaces are listed.
     """
-    lines, settle = [*_sentence(made), ""], []
-    for row in _rows(made):
-        told = wrapped(f"{row.name:{INDENT}}{row.value}", INDENT)
-        for key in row.keys:
-            reason = one_line(made.reasons.get(key, ""))  # its beginning may be the row's value
-            why, first = clauses(re.sub(f"^{re.escape(row.value)}[:;] ", "", reason))
-            settle += first
-            if why and why != [row.value]:
-                of = f"{in_words(key.rpartition('.')[2])}: " if key.endswith("_mm") else ""
-                told += wrapped(f"{'':{INDENT}}{of}{'; '.join(why)}", INDENT)
-        lines += told if verbose or row.name != SIMULATED else []
-    for one in left_out:
-        keys = " and ".join(f"part.target.{key}" for key in one.keys)
-        leave = f": {keys} in the design leave it out" if keys else ""
-        settle.append(f"{one.text}{leave}")
-    if settle:
+    lines = [*wrapped(told.sentence, 0), ""]
+    for row in told.rows:
+        if verbose or row.name != SIMULATED:
+            lines += wrapped(f"{row.name:{INDENT}}{row.value}", INDENT)
+            for reason in row.reasons:
+                lines += wrapped(f"{'':{INDENT}}{reason}", INDENT)
+    if told.matters:
         lines += ["", "To be settled before it is built:"]
-        for number, text in enumerate(settle, 1):
-            lines += wrapped(f"{number:2}. {_as_sentence(one_line(text))}", 4)
-    return [*lines, "", *surface_lines(made.known, len(made.known) if verbose else MOST_LISTED)]
+        for number, matter in enumerate(told.matters, 1):
+            lines += wrapped(f"{number:2}. {matter.mark}{matter.text}", 4)
+    most = len(told.choices) if verbose else MOST_LISTED
+    return [*lines, "", *choice_lines(told.choices, most)]
+
+
+def _matter(text: str) -> Matter:
+    sentence = _as_sentence(one_line(text))
+    found = TO_SETTLE.match(sentence)
+    mark = found[0] if found else ""
+    return Matter(mark, sentence[len(mark) :])
+
+
+def choices_of(known: Sequence[Surface]) -> list[Choice]:
+    """Return the surfaces that a target can be chosen from, of which none is proposed yet."""
+    return [_choice(one, False) for one in known]
+
+
+def _choice(one: Surface, is_target: bool) -> Choice:
+    place = str(one.keys["faces"][0]["at_mm"]) if "faces" in one.keys else ""
+    return Choice(one_line(one.name), one.text, place, one.alone, is_target)
+
+
+def choice_lines(choices: Sequence[Choice], most: int) -> list[str]:
+    """Return lines with at most `most` of the surfaces to choose a target from."""
+    lines = []
+    for one in choices[:most]:
+        place = f", one at {one.place} mm" if one.place else ""
+        alone = f"; {one.alone}" if one.alone else ""
+        lines += wrapped(f"  {one.name}: {one.text}{place}{alone}", 4)
+    more = [f"  and {len(choices) - most} more: --target pick"] if len(choices) > most else []
+    return ["Surfaces to choose from (--target):", *lines, *more]
 
 
 def clauses(reason: str) -> tuple[list[str], list[str]]:
@@ -80,17 +181,6 @@ def clauses(reason: str) -> tuple[list[str], list[str]]:
     return why, settle
 
 
-def surface_lines(known: Sequence[Surface], most: int) -> list[str]:
-    """Return lines with at most `most` surfaces of the part to choose a target from."""
-    lines = []
-    for one in known[:most]:
-        place = f", one at {one.keys['faces'][0]['at_mm']} mm" if "faces" in one.keys else ""
-        alone = f"; {one.alone}" if one.alone else ""
-        lines += wrapped(f"  {one_line(one.name)}: {one.text}{place}{alone}", 4)
-    more = [f"  and {len(known) - most} more: --target pick"] if len(known) > most else []
-    return ["Surfaces to choose from (--target):", *lines, *more]
-
-
 def time_in_words(seconds: float) -> str:
     """Return a time in the unit in which it is set on a machine, as "90 min"."""
     if seconds < 2 * MINUTE:
@@ -100,35 +190,34 @@ def time_in_words(seconds: float) -> str:
     return f"{plain(seconds / HOUR, 3)} h"
 
 
-def _sentence(made: Proposal) -> list[str]:
+def _sentence(made: Proposal) -> str:
     """Return what is proposed in one sentence."""
     design, part = made.design, made.chamber.part
     balls = " and then ".join(_balls(made))
     target = made.reasons["part.target"].partition(": ")[0]
     area = area_in_mm2(float(part.area[part.target].sum()))
-    return wrapped(
+    return (
         f"Peen {one_line(target)} ({area}) of {one_line(design.part.mesh_path.name)} for "
         f"{time_in_words(design.process.treatment_time)} with {balls}, the sonotrode at "
-        f"{design.sonotrode.zero_to_peak_um:g} µm zero-to-peak.",
-        0,
+        f"{design.sonotrode.zero_to_peak_um:g} µm zero-to-peak."
     )
 
 
-def _rows(made: Proposal) -> Iterator[_Row]:
-    """Yield what is told of a proposal, in the order in which a shop asks."""
+def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """Yield name and value of each row, and the keys whose reasons belong to it."""
     tables, design = made.tables, made.design
     target = made.reasons["part.target"].partition(": ")[0]
-    yield _Row("target", one_line(target), ("part.target", "part.target.reachable"))
-    yield _Row("part", f"{tables['materials']['part']}", ("part.unit", "materials.part"))
+    yield "target", one_line(target), ("part.target", "part.target.reachable")
+    yield "part", f"{tables['materials']['part']}", ("part.unit", "materials.part")
     pose = made.reasons.get("part.rotate_deg", "").partition(": ")[0]
-    yield _Row("pose", pose, ("part.rotate_deg", "effects.part_turn"))
+    yield "pose", pose, ("part.rotate_deg", "effects.part_turn")
     chamber = dict(tables["chamber"])
     shape = chamber.pop("shape", "cylinder")
     sizes = ", ".join(f"{in_words(key)} {value:g}" for key, value in _numbers(chamber))
-    yield _Row("chamber", f"{shape}: {sizes} mm", tuple(f"chamber.{key}" for key in chamber))
+    yield "chamber", f"{shape}: {sizes} mm", tuple(f"chamber.{key}" for key in chamber)
     blocks = design.sonotrode.blocks
     face = made.sonotrode.in_words if blocks is None else blocks.in_words
-    yield _Row("sonotrode", face, tuple(f"sonotrode.{key}" for key in tables["sonotrode"]))
+    yield "sonotrode", face, tuple(f"sonotrode.{key}" for key in tables["sonotrode"])
     for table, name in (("holder", "held by"), ("mask", "masked by")):
         own = {key: one for key, one in tables.items() if key.partition(".")[0] == table}
         if own:
@@ -141,20 +230,20 @@ def _rows(made: Proposal) -> Iterator[_Row]:
             keys = tuple(f"{one}.{key}" for one, values in own.items() for key in values)
             value = ", ".join(filter(None, (KINDS.get(kind, str(kind)), sizes)))
             whys = [why for key in keys for why in clauses(made.reasons.get(key, ""))[0]]
-            yield _Row(name, value or next(iter(whys), "see the design"), keys)
+            yield name, value or next(iter(whys), "see the design"), keys
     balls = ", then ".join(_balls(made))
-    yield _Row("balls", balls, ("shot.diameter_mm", "shot.mass_g", "shot.material"))
+    yield "balls", balls, ("shot.diameter_mm", "shot.mass_g", "shot.material")
     time = time_in_words(design.process.treatment_time)
-    yield _Row("time", time, ("process.treatment_time_s", "process.coverage_percent"))
+    yield "time", time, ("process.treatment_time_s", "process.coverage_percent")
     if ".steps" in made.reasons:
-        yield _Row("steps", made.reasons[".steps"].partition(": ")[0], (".steps",))
+        yield "steps", made.reasons[".steps"].partition(": ")[0], (".steps",)
     if INTENSITY in made.reasons:
         value = clauses(made.reasons[INTENSITY])[0][0]
-        yield _Row("intensity", value, (INTENSITY,))
+        yield "intensity", value, (INTENSITY,)
     accuracy = design.process.accuracy
     simulated = f"{accuracy.replicas} replicas of {plain(accuracy.simulated_time, 3)} s"
     keys = tuple(f"process.accuracy.{key}" for key in tables["process.accuracy"])
-    yield _Row(SIMULATED, simulated, keys)
+    yield SIMULATED, simulated, keys
 
 
 def _balls(made: Proposal) -> Iterator[str]:

@@ -24,11 +24,12 @@ from chamberopt.geometry.meshes.part_mesh import read_part_cached
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import METRES_PER, STATED, UnknownUnitError
 from chamberopt.page.acts import Acts, free_folder, path_inside
-from chamberopt.page.page_words import choices
-from chamberopt.page.started_commands import OneCommand
-from chamberopt.workflows.propose import Wishes
+from chamberopt.page.page_words import choices, on_page
+from chamberopt.page.started_commands import JSON, OneCommand
+from chamberopt.workflows.propose import PICTURE, Wishes
 
 PART_NAME = re.compile(r"\w[\w .,()+-]{0,150}")
+PROPOSING = "chamberopt new "  # begins a command that proposes a design
 MOST_NAMES = 40  # names of a part's surfaces that the page lists
 
 
@@ -61,7 +62,18 @@ class Front:
         return self.acts.inside(name) if self.acts else path_inside(self._folder, name)
 
     def status(self, _: object) -> dict[str, object]:
-        return self.command.status()
+        """Return what the pages show of the command.
+
+        Of one that proposes a chamber it is also the picture that there is by now, and the proposal
+        in the words of the page.
+        """
+        now = self.command.status()
+        if not str(now.get("command", "")).startswith(PROPOSING):
+            return now
+        picture = self._folder / str(now["result"]) / PICTURE
+        with suppress(OSError):  # there is none yet
+            now["picture"] = f"{now['result']}/{PICTURE}", picture.stat().st_mtime
+        return now | {"proposal": _on_page(now["answer"])}
 
     def stop(self, _: object) -> dict[str, object]:
         self.command.stop()
@@ -109,7 +121,7 @@ class Front:
         return {"sizes": {}, "size": format_box(mesh.size), "names": names}
 
     def propose(self, asked: Any) -> dict[str, object]:
-        """Start the command `new` for a part of the folder, and return into which folder."""
+        """Start the command `new` for a part of the folder, and return its status."""
         part = path_inside(self._folder, str(asked["part"]))
         wanted = {
             "unit": (asked["unit"], tuple(METRES_PER)),
@@ -133,7 +145,7 @@ class Front:
                 arguments += [f"--{option}=./{file.relative_to(self._folder).as_posix()}"]
         arguments += [] if asked["pilot"] else ["--no-pilot"]
         out = free_folder(self._folder, Path(part.stem))
-        return {"out": out, **self.command.start([*arguments, f"--out={out}"], self._folder)}
+        return self.command.start([*arguments, JSON, f"--out={out}"], self._folder, out)
 
     def open(self, asked: Any) -> dict[str, object]:
         """Show the page of a design from now on."""
@@ -149,6 +161,28 @@ class Front:
             self.acts.close()
         self.acts = None
         return {}
+
+
+def _on_page(answer: Any) -> dict[str, object] | None:
+    """Return a proposal that `new` has answered, in the words of the page; None before it has."""
+    if answer is None:
+        return None
+    return {
+        "sentence": on_page(answer["sentence"]),
+        "rows": [
+            {
+                "name": row["name"],
+                "value": on_page(row["value"]),
+                "reasons": [on_page(text) for text in row["reasons"]],
+            }
+            for row in answer["rows"]
+        ],
+        "matters": [
+            {"mark": one["mark"].capitalize(), "text": on_page(one["text"])}
+            for one in answer["matters"]
+        ],
+        "choices": answer["choices"],
+    }
 
 
 def _require_possible(wishes: Mapping[str, str], alloy: str, pilot: bool) -> None:

@@ -10,13 +10,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Lock, Thread
-from typing import Any
+from typing import IO, Any
 
 from chamberopt.common.child import GRACE_S, start_python
 from chamberopt.common.errors import InputError
 from chamberopt.page.page_words import on_page
 
 WARNING = "warning: "  # begins a line
+JSON = "--json"  # option of a command that is asked for JSON
 MOST_LINES = 200  # lines of a command's remarks that the page shows, the last ones
 COMMAND = (
     "from chamberopt.common.child import interrupt_with_parent; interrupt_with_parent(); "
@@ -30,6 +31,7 @@ class StartedCommand:
     def __init__(self, arguments: Sequence[str], folder: Path, result: str = "") -> None:
         self.arguments, self._result = list(arguments), result
         self._lines: list[str] = []
+        self._answer: list[str] = []  # lines of JSON, of a command that was asked for JSON
         self._steps: dict[str, dict[str, Any]] = {}
         self._process = start_python(
             COMMAND,
@@ -41,24 +43,29 @@ class StartedCommand:
             start_new_session=True,
             creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
             env={**os.environ, "PYTHONIOENCODING": "utf-8"},  # pipes of Windows have another
-            stderr=subprocess.STDOUT,
+            stderr=subprocess.PIPE,
             text=True,
             encoding="utf-8",
             errors="replace",
         )
-        self._reader = Thread(target=self._read, daemon=True)
-        self._reader.start()
+        printed = self._answer if JSON in arguments else self._lines
+        streams = (self._process.stdout, printed), (self._process.stderr, self._lines)
+        self._readers = [Thread(target=self._read, args=one, daemon=True) for one in streams]
+        for one in self._readers:
+            one.start()
 
     def status(self) -> dict[str, object]:
         """Return what the page shows of the command: printed lines and progress of its steps.
 
         The value `exit` is the exit status of the command, or None while it runs. `result` is the
         folder of the result that it will leave, if any. Its warnings, and its lines where it
-        failed, are in the words of the page too.
+        failed, are in the words of the page too. `answer` is what a command that was asked for JSON
+        has answered, or None.
         """
         code = self._process.poll()
         if code is not None:
-            self._reader.join(5.0)
+            for one in self._readers:
+                one.join(5.0)
         lines = self._lines[-MOST_LINES:]
         warnings = [one.removeprefix(WARNING) for one in lines if one.startswith(WARNING)]
         return {
@@ -69,6 +76,7 @@ class StartedCommand:
             "warnings": [on_page(text) for text in warnings],
             "fault": [on_page(text) for text in lines] if code else [],
             "exit": code,
+            "answer": json.loads("".join(self._answer)) if self._answer and code == 0 else None,
         }
 
     def stop(self) -> None:
@@ -93,11 +101,12 @@ class StartedCommand:
         if self._process.stdin is not None:
             self._process.stdin.close()
 
-    def _read(self) -> None:
-        for line in self._process.stdout or ():
+    def _read(self, stream: IO[str], lines: list[str]) -> None:
+        """Take the lines that the command prints to a stream until its end, its steps apart."""
+        for line in stream:
             step = _step(line)
             if step is None:
-                self._lines.append(line.rstrip("\n"))
+                lines.append(line.rstrip("\n"))
             elif step.get("ended"):
                 self._steps.pop(step["step"], None)
             else:
@@ -126,7 +135,7 @@ class OneCommand:
 
         Args:
             arguments: those of the command line.
-            result: folder of the result that the command will leave, if any.
+            result: folder that the command will leave, if any.
 
         Raises InputError if a command is running.
         """

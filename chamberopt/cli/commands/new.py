@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from chamberopt.cli.console import print_remarks, show
-from chamberopt.cli.options import Out, Verbose, app
+from chamberopt.cli.console import print_json, print_remarks, show
+from chamberopt.cli.options import Json, Out, Verbose, app
 from chamberopt.common.errors import one_line
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def new(
     calibration: Path | None = None,
     unit: Literal["um", "mm", "cm", "m", "in", "guess"] | None = None,
     pilot: bool = True,
+    json: Json = False,
     out: Out = None,
     verbose: Verbose = False,
 ) -> None:
@@ -90,7 +91,7 @@ def new(
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.errors import InputError
     from chamberopt.common.files import claim_folder
-    from chamberopt.documents.proposal import proposal_end
+    from chamberopt.documents.proposal import proposal_in_words, proposal_lines
     from chamberopt.geometry.meshes.units import STATED, UnknownUnitError
     from chamberopt.workflows.propose import DESIGN, Wishes, require_file, write_proposal
 
@@ -126,11 +127,16 @@ def new(
         made = propose(part, wanted, choose)
 
     done = write_proposal(made, part, wishes, choose, out, TerminalTeller())
-    show(proposal_end(done.made, done.left_out, verbose))
+    words = proposal_in_words(done.made, done.left_out)
+    if not json:
+        show(proposal_lines(words, verbose))
     print_remarks(f"note: {one_line(text)}" for text in done.made.mesh.notes)
     print_remarks(f"warning: {text}" for text in done.made.warnings)
-    studies = (f"study in {out / name}" for name in done.studies)
-    show([f"design in {out / DESIGN}", *studies])
+    if json:
+        studies = [str(out / name) for name in done.studies]
+        print_json({**asdict(words), "design": str(out / DESIGN), "studies": studies})
+        return
+    show([f"design in {out / DESIGN}", *(f"study in {out / name}" for name in done.studies)])
 
 
 def _asked_unit(part: Path, sizes: Mapping[str, str]) -> str:
@@ -156,9 +162,9 @@ def _asked_unit(part: Path, sizes: Mapping[str, str]) -> str:
 def _picked(known: Sequence[Surface]) -> Sequence[str]:
     """Ask the user which of the part's surfaces are to be peened, and return their names."""
     from chamberopt.common.errors import InputError
-    from chamberopt.documents.proposal import surface_lines
+    from chamberopt.documents.proposal import choice_lines, choices_of
 
-    show(surface_lines(known, len(known)))
+    show(choice_lines(choices_of(known), len(known)))
     try:
         answer = input("to be peened, separated by commas: ").strip()
     except EOFError:

@@ -4,7 +4,7 @@ import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import "./study/study.js";
-import { ask, attempt, element, isUnsaved, listen, onPage, read, say, showStep, state, takeTold, undo, unpack, wordsOf } from "./state.js";
+import { ask, attempt, element, isUnsaved, listen, onPage, read, say, showStep, state, takeTold, undo, unpack, warning, wordsOf } from "./state.js";
 import { lookAnew, setHandles, showCavity, showPart, showShape, showState } from "./scene.js";
 
 const find = (id) => document.getElementById(id);
@@ -107,7 +107,7 @@ function refuse(text) {
 
 function sayOf({ facts, warnings, notes }) {
   const list = (texts) => texts.map((text) => element("li", {}, ...onPage(text)));
-  find("warnings").replaceChildren(...list(warnings));
+  find("warnings").replaceChildren(...warnings.map(warning));
   find("notes").replaceChildren(...list(notes));
   find("facts").replaceChildren(...facts.flatMap(([subject, told]) => [element("dt", { textContent: subject[0].toUpperCase() + subject.slice(1) }),
     ...told.map((words) => element("dd", {}, ...onPage(words)))]));

@@ -1,5 +1,5 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
-import { ask, attempt, element, onPage, say, wordsOf } from "./state.js";
+import { ask, attempt, element, onPage, warning, wordsOf } from "./state.js";
 import { bars, followed } from "./steps.js";
 
 const find = (id) => document.getElementById(id);
@@ -82,14 +82,40 @@ drop.addEventListener("drop", (event) => attempt(() => bring(event.dataTransfer.
 find("file").addEventListener("change", () => attempt(() => bring(find("file").files[0])));
 find("part").addEventListener("change", () => attempt(() => look(find("part").value)));
 
-function tell({ steps, lines, warnings, fault, exit }) {
+// Show the command that proposes a chamber: how far it is, and in the end what it proposes.
+let drawn = 0; // when the picture that is shown was drawn
+function tell({ steps, lines, warnings, fault, exit, picture, result, proposal }) {
+  find("made").hidden = false;
   find("stop").hidden = exit !== null;
+  find("busy").textContent = exit !== null ? "" : steps.length ? "at work" : "reading the part and choosing sizes …";
   find("progress").replaceChildren(...bars(steps));
-  find("warnings").replaceChildren(...warnings.map((words) => element("li", {}, ...onPage(words))));
+  find("warnings").replaceChildren(...warnings.map(warning));
   find("printed").textContent = lines.join("\n");
-  find("printed-fold").hidden = !lines.length;
+  find("printed-fold").hidden = exit === null || !lines.length;
   find("error").hidden = !exit;
   find("error").replaceChildren(...fault.flatMap((words) => [...onPage(words), "\n"]));
+  find("picture").hidden = !picture;
+  if (picture && picture[1] !== drawn) find("picture").src = `/files/${picture[0].split("/").map(encodeURIComponent).join("/")}?${drawn = picture[1]}`;
+  find("proposal").hidden = !proposal;
+  find("rows").hidden = !proposal;
+  find("another").hidden = !proposal || !known.part;
+  if (proposal) showProposal(proposal, `${result}/design.toml`);
+}
+
+function showProposal({ sentence, rows, matters, choices }, design) {
+  find("sentence").replaceChildren(...onPage(sentence));
+  find("to-settle").hidden = !matters.length;
+  find("matters").replaceChildren(...matters.map(({ mark, text }) => element("li", {}, element("b", { textContent: mark }), ...onPage(text))));
+  find("rows").replaceChildren(...rows.map(({ name, value, reasons }) => element("tr", {},
+    element("th", { textContent: name[0].toUpperCase() + name.slice(1) }),
+    element("td", {}, element("b", {}, ...onPage(value)), ...reasons.map((words) => element("p", {}, ...onPage(words)))))));
+  find("choices").replaceChildren(...choices.map(({ name, text, place, alone, is_target }) => {
+    const title = [place && `at ${place} mm in the part's file`, alone].filter(Boolean).join("; ");
+    const button = element("button", { title, ariaPressed: String(is_target) }, name, element("small", { textContent: ` ${text}` }));
+    button.addEventListener("click", () => attempt(() => propose([name])));
+    return button;
+  }));
+  find("open-made").onclick = () => attempt(() => open(design));
 }
 
 const WISHES = ["material", "intensity", "coverage", "shop", "calibration", "shot", "ball-mm", "pose", "shape"]; // options of `new`
@@ -108,8 +134,8 @@ function besideField(text, words) {
   return true;
 }
 
-async function started() {
-  const target = [...find("names").querySelectorAll("input:checked")].map((one) => one.value);
+const ticked = () => [...find("names").querySelectorAll("input")];
+async function started(target) {
   const wishes = Object.fromEntries(WISHES.map((id) => [id, find(id).value.trim()]));
   for (const id of NUMBERS) wishes[id] = wishes[id].replace(/(\d),(?=\d)/g, "$1."); // a decimal comma
   besideField("");
@@ -119,25 +145,30 @@ async function started() {
   }
 }
 
-find("propose").addEventListener("click", () => attempt(async () => {
-  const begun = await started();
+// Propose a chamber that peens these surfaces, by default the likeliest one.
+async function propose(target) {
+  const begun = await started(target);
   if (!begun) return;
-  const design = `${begun.out}/design.toml`;
+  for (const one of ticked()) one.checked = target.includes(one.value);
   find("made").hidden = false;
-  find("next").hidden = find("picture").hidden = find("propose").disabled = true;
   find("made").scrollIntoView({ behavior: "smooth" });
-  const ended = await followed(tell, begun);
-  find("propose").disabled = false;
-  if (ended.exit !== 0) {
-    find("made").hidden = besideField(ended.lines.at(-1) ?? "", ended.fault.at(-1));
-    return;
-  }
-  find("picture").src = `/files/${begun.out.split("/").map(encodeURIComponent).join("/")}/design.png`;
-  find("next").hidden = find("picture").hidden = false;
-  find("printed-fold").open = true; // what is proposed, why, and what is to be settled
-  find("open-made").onclick = () => attempt(() => open(design));
-  find("open-made").focus();
+  await follow(begun);
   await show(known.part);
-}));
+}
+
+// Follow the command that proposes a chamber to its end.
+async function follow(begun) {
+  find("propose").disabled = true;
+  const ended = await followed(tell, begun);
+  find("propose").disabled = !known.part;
+  if (ended.exit !== 0) find("made").hidden = besideField(ended.lines.at(-1) ?? "", ended.fault.at(-1));
+  else find("open-made").focus({ preventScroll: true });
+}
+
+find("propose").addEventListener("click", () => attempt(() => propose(ticked().filter((one) => one.checked).map((one) => one.value))));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
 attempt(async () => look(await show())).then(() => { document.body.dataset.ready = "yes"; });
+attempt(async () => { // of before a reload, or before a design was opened
+  const now = await ask("/status");
+  if (now.command?.startsWith("chamberopt new ")) await follow(now);
+});

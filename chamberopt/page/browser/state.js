@@ -112,6 +112,8 @@ let fading = 0;
 // Text, or a message of the server: texts, and pairs of words with what they are in a file as a tip.
 export const onPage = (words) => [words].flat().map((one) => typeof one === "string" ? one
   : element("abbr", { textContent: one[0], title: one[1] }));
+// A warning as one line, which opens on a click.
+export const warning = (words) => element("details", { className: "warned" }, element("summary", {}, ...onPage(words)));
 export const wordsOf = (error) => error.words ?? error.message;
 
 export function say(text, good = false) {

@@ -6,7 +6,13 @@ import trimesh
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_mask import LeftOut
-from chamberopt.documents.proposal import WIDTH, clauses, proposal_end, time_in_words
+from chamberopt.documents.proposal import (
+    WIDTH,
+    clauses,
+    proposal_in_words,
+    proposal_lines,
+    time_in_words,
+)
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +25,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Proposal:
 def test_all_that_is_to_be_settled_is_one_list(made: Proposal) -> None:
     """What reasons say in capitals, and what the shot meets beside the target."""
     left_out = [LeftOut({}, "NOT MASKED: the shot also meets PIN")]
-    text = "\n".join(proposal_end(made, left_out, verbose=False))
+    text = "\n".join(proposal_lines(proposal_in_words(made, left_out), verbose=False))
     told, _, settle = text.partition("\nTo be settled before it is built:\n")
     assert "ALLOY NOT KNOWN" in settle
     assert "NOT MEASURED" in settle
@@ -31,7 +37,8 @@ def test_all_that_is_to_be_settled_is_one_list(made: Proposal) -> None:
 
 def test_verbose_has_every_reason_and_every_surface(made: Proposal) -> None:
     short, text = (
-        " ".join(" ".join(proposal_end(made, [], verbose=one)).split()) for one in (False, True)
+        " ".join(" ".join(proposal_lines(proposal_in_words(made, []), verbose=one)).split())
+        for one in (False, True)
     )
     for name in ("shot.diameter_mm", "chamber.length_mm", "process.accuracy.simulated_time_s"):
         for clause in clauses(made.reasons.get(name, ""))[0]:

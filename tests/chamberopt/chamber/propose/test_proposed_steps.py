@@ -17,7 +17,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.load import load_design
-from chamberopt.documents.proposal import proposal_end
+from chamberopt.documents.proposal import proposal_in_words, proposal_lines
 
 SLOT, COARSE, FINER = 5.0, 3.0, 1.0  # mm: balls of a quarter of the slot serve it
 
@@ -70,7 +70,7 @@ def test_each_size_peens_for_its_own_time_in_one_chamber(coarse: Proposal, tmp_p
     assert "about 0.3 mmA on the" in told
     assert "TWO INTENSITIES" in told
     assert two.reasons["shot.diameter_mm"] == "chosen for the intensity"
-    lines = " ".join(" ".join(proposal_end(two, [], verbose=False)).split())
+    lines = " ".join(" ".join(proposal_lines(proposal_in_words(two, []), verbose=False)).split())
     assert "balls of 3 mm (steel" in lines
     assert " and then " in lines
     assert ". TWO INTENSITIES: narrow places" in lines
