@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 WIDTH, INDENT = 79, 13  # columns
 MOST_LISTED = 6  # surfaces, without --verbose
 TO_SETTLE = re.compile(r"[A-Z][A-Z-]+(?: [A-Z-]{2,})*\b")  # at the beginning of a clause
-NO_MATTER = ("ZERO-TO-PEAK", "PEAK-TO-VALLEY", "WIDER", "SAE ")  # no matter of the shop
+STANDARD = "SAE "  # begins the name of one
 SIMULATED = "simulated"  # the row that is told with --verbose alone
 KINDS = {"bore": "the part itself, out through a wall"}  # of holders, in words
 MINUTE, HOUR = 60.0, 3600.0  # s
@@ -176,7 +176,7 @@ def clauses(reason: str) -> tuple[list[str], list[str]]:
     settle: list[str] = []
     for clause in filter(None, reason.split("; ")):
         found = TO_SETTLE.match(clause)
-        marks = found is not None and len(found[0]) > 3 and not found[0].startswith(NO_MATTER)
+        marks = found is not None and len(found[0]) > 3 and not found[0].startswith(STANDARD)
         (settle if marks else why).append(clause)
     return why, settle
 
@@ -238,7 +238,7 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     if ".steps" in made.reasons:
         yield "steps", made.reasons[".steps"].partition(": ")[0], (".steps",)
     if INTENSITY in made.reasons:
-        value = clauses(made.reasons[INTENSITY])[0][0]
+        value = clauses(made.reasons[INTENSITY])[0][0].partition(": ")[0]
         yield "intensity", value, (INTENSITY,)
     accuracy = design.process.accuracy
     simulated = f"{accuracy.replicas} replicas of {plain(accuracy.simulated_time, 3)} s"

@@ -19,6 +19,7 @@ from chamberopt.design.calibration import Calibration
 from chamberopt.design.design import validate
 from chamberopt.design.load import is_study
 from chamberopt.design.materials import alloys, balls
+from chamberopt.documents.proposal import SIMULATED
 from chamberopt.geometry.meshes.formats import SUFFIXES, is_mesh_name
 from chamberopt.geometry.meshes.part_mesh import read_part_cached
 from chamberopt.geometry.meshes.surface_error import format_box
@@ -176,6 +177,7 @@ def _on_page(answer: Any) -> dict[str, object] | None:
                 "reasons": [on_page(text) for text in row["reasons"]],
             }
             for row in answer["rows"]
+            if row["name"] != SIMULATED  # with their reasons among the numbers of the design
         ],
         "matters": [
             {"mark": one["mark"].capitalize(), "text": on_page(one["text"])}

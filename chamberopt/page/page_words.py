@@ -45,7 +45,8 @@ _TABLES = (
     "tolerances|ranges"
 )
 _DOTTED = rf"(?:{_TABLES})(?:\.\w+)+"
-_KEY = re.compile(rf"\[{_DOTTED}\]|(?<![\w./]){_DOTTED}|--(?:{'|'.join(OPTIONS)})(?![\w-])")
+_GUIDE = r"docs/[\w/]+\.md(?:#[\w-]+)?"
+_KEY = re.compile(rf"{_GUIDE}|\[(?:{_TABLES})\]|\[{_DOTTED}\]|(?<![\w./]){_DOTTED}|--(?:{'|'.join(OPTIONS)})(?![\w-])")
 _FILES = (".toml", ".json", ".html", ".pdf", ".png", *SUFFIXES)  # "part.stl" is no key
 
 
@@ -63,6 +64,7 @@ def on_page(text: str) -> Words:
             continue
         key = found.strip("[]").removeprefix("effects.")
         words = OPTIONS.get(found[2:]) or inner_first(key)
+        words = "guide" if found.startswith("docs/") else words
         made += [text[at : match.start()]] * (match.start() > at)
         made.append((words, found))
         at = match.end()

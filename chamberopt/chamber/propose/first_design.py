@@ -531,7 +531,7 @@ def _floor_reasons(floor: Floor, is_local: bool, goes_out: bool) -> dict[str, st
     placed = "the target ends near the wall" if goes_out else "the target in the middle"
     key, _ = one.amplitude_nearest(AMPLITUDE_UM)
     kind = (
-        "ZERO-TO-PEAK, half of" if key == "amplitude_um" else "PEAK-TO-VALLEY, twice zero-to-peak"
+        "zero-to-peak, half of" if key == "amplitude_um" else "peak-to-valley, twice zero-to-peak"
     )
     kind += " peak-to-valley" if key == "amplitude_um" else ""
     return {

@@ -123,7 +123,7 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
         f"about {rounded(dents * gauge, 2)} dents in a window by a pilot; {needed:.0f} would do"
     )
     few = f"; TOO FEW DENTS within {MINUTES:g} minutes on two cores; give more"
-    wider = f"WIDER than the usual 1 mm²: enough dents within {MINUTES:g} minutes on two cores"
+    wider = f"wider than the usual 1 mm²: enough dents within {MINUTES:g} minutes on two cores"
     reasons = {
         "process.treatment_time_s": _said_of_treatment(found, treatment, coverage_percent),
         "process.accuracy.simulated_time_s": expected + (few if dents * gauge < needed else ""),

@@ -277,7 +277,7 @@ def is_off(made: Proposal, predicted: PredictedIntensity | None) -> bool:
 def as_no_wish(made: Proposal) -> Proposal:
     """Return a proposal for an intensity that nobody asked for, without that wish in its design."""
     reasons = dict(made.reasons)
-    reasons[INTENSITY] += "; --intensity none keeps the largest amplitude"
+    reasons[INTENSITY] += "; to keep the largest amplitude: --intensity none"
     process = {k: one for k, one in made.tables["process"].items() if k != "intensity_mmA"}
     return replace(
         made,
@@ -355,7 +355,7 @@ def _needed(made: Proposal, off: float) -> str:
     allowed = "larger than" if off < 0.0 else "smaller than"
     return (
         f"it takes an amplitude of about {plain(amplitude, 2)} µm zero-to-peak, or balls of about "
-        f"{plain(ball, 2)} mm, {allowed} are proposed here (--ball-mm takes others)"
+        f"{plain(ball, 2)} mm, {allowed} are proposed here (choose others: --ball-mm)"
     )
 
 

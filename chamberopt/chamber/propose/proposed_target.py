@@ -146,7 +146,7 @@ SELDOM = re.compile(
 )
 # Names of what runs in bearings: where they are no target, its size and finish must stay.
 RUNNING = re.compile(r"(?<![a-z])(?:pin|journal|race|bearing|zapfen)s?(?![a-z])", re.I)
-BY_SIZE = "CHOSEN BY SIZE ALONE: confirm that it is what fails in use (--target takes another)"
+BY_SIZE = "CHOSEN BY SIZE ALONE: confirm that it is what fails in use (choose another: --target)"
 AS_LARGE = 0.9  # of the largest face's area: the target takes a face as large, e.g. a blade's back
 PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100

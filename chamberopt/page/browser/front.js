@@ -95,7 +95,10 @@ function tell({ steps, lines, warnings, fault, exit, picture, result, proposal }
   find("error").hidden = !exit;
   find("error").replaceChildren(...fault.flatMap((words) => [...onPage(words), "\n"]));
   find("picture").hidden = !picture;
-  if (picture && picture[1] !== drawn) find("picture").src = `/files/${picture[0].split("/").map(encodeURIComponent).join("/")}?${drawn = picture[1]}`;
+  if (picture && picture[1] !== drawn) {
+    find("picture").href = `/files/${picture[0].split("/").map(encodeURIComponent).join("/")}?${drawn = picture[1]}`;
+    find("picture").firstElementChild.src = find("picture").href;
+  }
   find("proposal").hidden = !proposal;
   find("rows").hidden = !proposal;
   find("another").hidden = !proposal || !known.part;

@@ -54,7 +54,6 @@ def test_verbose_has_every_reason_and_every_surface(made: Proposal) -> None:
         ("", [], []),
         ("half a layer", ["half a layer"], []),
         ("serves all; BALLS JAM in gaps; 2 mm", ["serves all", "2 mm"], ["BALLS JAM in gaps"]),
-        ("ZERO-TO-PEAK, half", ["ZERO-TO-PEAK, half"], []),
         ("SAE AMS 2430 says", ["SAE AMS 2430 says"], []),
         ("LONG: turn it", [], ["LONG: turn it"]),
         ("TURNED BY A DRIVE, at 60 rpm", [], ["TURNED BY A DRIVE, at 60 rpm"]),

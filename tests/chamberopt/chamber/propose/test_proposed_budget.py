@@ -49,7 +49,7 @@ def test_windows_widen_where_the_time_would_be_too_long_and_it_is_said() -> None
     assert REPLICAS * budget.time * 1e5 <= 1.5 * COLLISIONS
     assert budget.gauge_mm2 > 1.0
     assert 1e5 * 1e-6 * budget.gauge_mm2 * REPLICAS * budget.time >= DENTS
-    assert budget.reasons[GAUGE].startswith("WIDER than the usual 1 mm²")
+    assert budget.reasons[GAUGE].startswith("wider than the usual 1 mm²")
 
 
 def test_what_does_not_resolve_in_the_time_is_said() -> None:
