@@ -14,7 +14,12 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.cut import cut_at_box
 from chamberopt.geometry.faces import Faces
-from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part_cached, select_triangles
+from chamberopt.geometry.meshes.part_mesh import (
+    PartMesh,
+    keep_part,
+    read_part_cached,
+    select_triangles,
+)
 from chamberopt.geometry.remesh import remesh, triangle_quality
 from chamberopt.geometry.smoothing.divide import Surface
 from chamberopt.geometry.smoothing.part import SmoothingFacts, smooth
@@ -380,6 +385,12 @@ def _part_of_file(design: Design) -> PartMesh:
     if setup is not None:
         return setup.part
     return read_part_cached(part.mesh_path, part.unit, part.limits)
+
+
+def keep_part_of(design: Design, mesh: PartMesh) -> None:
+    """Take this mesh for the part of a design, which another process has read from its file."""
+    part = design.part
+    keep_part(mesh, part.mesh_path, part.unit, part.limits)
 
 
 def _is_wall(design: Design) -> bool:

@@ -9,6 +9,7 @@ from itertools import count, product
 from pathlib import Path
 from typing import Any
 
+from chamberopt.chamber.part import preview_part
 from chamberopt.chamber.propose.text import study_lines
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import (
@@ -103,7 +104,7 @@ class Acts:
         self._path, self._trusted, self._command = path.resolve(), trusted, command
         self._files: dict[str, EditedFile] = {}
         first = self._read()
-        self._picker, self._checker = Picker(), Checker(first.path, first.text)
+        self._picker, self._checker = Picker(), Checker(first.path)
 
     def close(self) -> None:
         self._checker.stop()
@@ -131,9 +132,11 @@ class Acts:
 
     def cavity(self, asked: Any) -> bytes:
         file = self._file(asked)
-        file.with_changes(asked["changes"])  # so that a wrong value is told at once
+        design = file.with_changes(asked["changes"])  # so that a wrong value is told at once
         text, step = file.changed_text(asked["changes"]), int(asked.get("step", 0))
-        number, answer = self._checker.cavity(text, step)
+        # A drawn set-up has its part in a drawing with its walls, which the check reads itself.
+        part = preview_part(design).mesh if design.chamber.setup() is None else None
+        number, answer = self._checker.cavity(text, step, part)
         return number.to_bytes(4, "little") + answer
 
     def reach(self, asked: Any) -> bytes:

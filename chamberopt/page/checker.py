@@ -8,14 +8,15 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from threading import Lock
 
+from chamberopt.chamber.part import keep_part_of
 from chamberopt.common.child import Child, ChildLostError
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design, validate
-from chamberopt.page.answers import check_answers, part_answer
+from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.page.answers import check_answers
 from sim_core import SceneError
 
 ENDED = "the check's process ended (killed from outside, or out of memory)"
@@ -29,20 +30,23 @@ class Checker:
     """Answers questions on versions of a design: first its cavity, then the reach of its shot.
 
     A new question ends the child process that still computes the reach for an older question. A
-    spare child, which has read the part already, takes its place.
+    spare child, which is started after an answer, takes its place.
     """
 
-    def __init__(self, path: Path, text: str) -> None:
-        self._path, self._text, self._newest = path, text, 0
+    def __init__(self, path: Path) -> None:
+        self._path, self._newest = path, 0
         self._turn, self._reaching = Lock(), Lock()
-        self._now, self._spare = self._start(), self._start()
+        self._now: Child = _started()
+        self._spare: Child | None = None
         self._asked: dict[Child, int] = {}  # number of the question that a child works at
+        self._has: dict[Child, PartMesh] = {}  # part that a child was given
 
-    def cavity(self, text: str, step: int = 0) -> tuple[int, bytes]:
+    def cavity(self, text: str, step: int = 0, part: PartMesh | None = None) -> tuple[int, bytes]:
         """Return the number of this question, and the cavity of the design with this text.
 
         Args:
             step: number of the step whose chamber is shown, for a design with steps.
+            part: the design's part as its file has it; None if the child is to read it.
 
         Raises:
             InputError, SceneError: the design cannot be built.
@@ -56,8 +60,13 @@ class Checker:
             while self._now in self._asked or self._now.pid is None:
                 self._replace()
             self._asked[self._now] = mine
-            self._now.ask(_check, self._path, text, step)
-            return mine, self._answer(self._now, mine)
+            new = None if self._has.get(self._now) is part else part
+            if new is not None:
+                self._has[self._now] = new
+            self._now.ask(_check, self._path, text, step, new)
+            answer = self._answer(self._now, mine)
+            self._spare = self._spare or _started()
+            return mine, answer
 
     def reach(self, number: int) -> bytes:
         """Return which surface the shot can reach, for the design of the question with this number.
@@ -76,18 +85,14 @@ class Checker:
 
     def stop(self) -> None:
         """End the child processes."""
-        for child in (self._now, self._spare):
+        for child in filter(None, (self._now, self._spare)):
             child.end()
-
-    def _start(self) -> Child:
-        child = Child()
-        child.ask(_read_ahead, self._path, self._text)
-        return child
 
     def _replace(self) -> None:
         self._now.end()
         self._asked.pop(self._now, None)
-        self._now, self._spare = self._spare, self._start()
+        self._has.pop(self._now, None)
+        self._now, self._spare = self._spare or _started(), None
 
     def _answer(self, child: Child, number: int) -> bytes:
         try:
@@ -102,25 +107,33 @@ class Checker:
             raise
 
 
-def _read_ahead(path: Path, text: str) -> Iterator[bytes]:
-    """Read the part of a design, which this child process keeps for later checks.
+def _started() -> Child:
+    """Return a child process that has imported what a check takes."""
+    child = Child()
+    child.ask(_yield_to_the_page)
+    return child
 
-    Yields no answer.
-    """
+
+def _yield_to_the_page() -> Iterator[bytes]:
+    """Let the page's own answers come first. Yields no answer."""
     if hasattr(os, "nice"):
-        os.nice(10)  # the page's own answers come first
-    with suppress(Exception):  # the first check meets the same fault, and tells it
-        part_answer(validate(Design, tomllib.loads(text), path, text))
+        os.nice(10)
     yield from ()
 
 
-def _check(path: Path, text: str, step: int) -> Iterator[bytes]:
+def _check(path: Path, text: str, step: int, part: PartMesh | None) -> Iterator[bytes]:
     """Yield the cavity of the design with this text, then the reach of its shot.
+
+    Args:
+        part: the part of the design, if this process has not got it yet.
 
     Raises InputError or SceneError if the design cannot be built.
     """
     try:
-        yield from check_answers(validate(Design, tomllib.loads(text), path, text), step)
+        design = validate(Design, tomllib.loads(text), path, text)
+        if part is not None:
+            keep_part_of(design, part)
+        yield from check_answers(design, step)
     except (InputError, SceneError):
         raise
     except Exception as error:  # a fault of the program, whose message must not blame the design

@@ -21,7 +21,7 @@ from chamberopt.design.load import is_study
 from chamberopt.design.materials import alloys, balls
 from chamberopt.documents.proposal import SIMULATED
 from chamberopt.geometry.meshes.formats import SUFFIXES, is_mesh_name
-from chamberopt.geometry.meshes.part_mesh import read_part_cached
+from chamberopt.geometry.meshes.part_mesh import keep_part, read_part_cached
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import METRES_PER, STATED, UnknownUnitError
 from chamberopt.page.acts import Acts, free_folder, path_inside
@@ -118,6 +118,7 @@ class Front:
             mesh = read_part_cached(path, unit)
         except UnknownUnitError as error:
             return {"sizes": error.sizes, "size": "", "names": []}
+        keep_part(mesh, path, mesh.unit)  # a design names the unit, and is opened without a wait
         names = [[one.name, one.text] for one in named_surfaces(mesh)[:MOST_NAMES]]
         return {"sizes": {}, "size": format_box(mesh.size), "names": names}
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,7 @@ from chamberopt.geometry.meshes.surface_error import SurfaceError
 from chamberopt.geometry.meshes.units import METRES_PER, find_unit
 from chamberopt.geometry.triangles import unit_normals
 
+MOST_KEPT = 8  # parts that read_part_cached keeps
 MEANT = 0.5  # cosine between a facet and a stated normal, below which the normal is wrong
 
 
@@ -112,17 +113,40 @@ def read_part_cached(path: Path, unit: str = "guess", how: Tessellation | None =
         InputError: for a file that cannot be used, and for a surface that is not closed.
     """
     try:
-        stamp = path.stat()
+        key = _key(path, unit, how)
     except OSError:
         return read_part(path, unit, how)  # this raises an error that explains the reason
-    return _read_part_cached(path, unit, how, stamp.st_mtime_ns, stamp.st_size)
+    mesh = _kept.get(key)
+    if mesh is None:
+        mesh = read_part(path, unit, how)
+        _keep(key, mesh)
+    return mesh
 
 
-@lru_cache(maxsize=8)
-def _read_part_cached(
-    path: Path, unit: str, how: Tessellation | None, _changed: int, _size: int
-) -> PartMesh:
-    return read_part(path, unit, how)
+def keep_part(mesh: PartMesh, path: Path, unit: str, how: Tessellation | None = None) -> None:
+    """Make later calls of `read_part_cached` return a part that was read elsewhere.
+
+    Another process may have read it, or this one without a unit where the file states this one.
+    """
+    with suppress(OSError):  # the file is gone: the next reader says so
+        _keep(_key(path, unit, how), mesh)
+
+
+_Key = tuple[Path, str, Tessellation | None, int, int]
+_kept: dict[_Key, PartMesh] = {}
+
+
+def _key(path: Path, unit: str, how: Tessellation | None) -> _Key:
+    """Return what a part is kept by. Raises OSError for a file that is not there."""
+    stamp = path.stat()
+    return path.resolve(), unit, how, stamp.st_mtime_ns, stamp.st_size
+
+
+def _keep(key: _Key, mesh: PartMesh) -> None:
+    """Keep a part; the oldest of more than MOST_KEPT is dropped."""
+    _kept[key] = mesh
+    for old in list(_kept)[:-MOST_KEPT]:
+        _kept.pop(old, None)  # another thread may have dropped it
 
 
 def read_triangles(

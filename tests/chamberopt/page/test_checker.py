@@ -6,12 +6,15 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from chamberopt.chamber.part import preview_part
 from chamberopt.common.errors import InputError
+from chamberopt.design.load import load_design
 from chamberopt.page.checker import Checker, SupersededError
 from tests.hunt.base import write_base
 
@@ -27,7 +30,7 @@ def text(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 
 @pytest.fixture
 def checker(text: tuple[Path, str]) -> Iterator[Checker]:
-    started = Checker(*text)
+    started = Checker(text[0])
     yield started
     started.stop()
 
@@ -94,3 +97,16 @@ def test_a_child_that_is_killed_is_told_and_replaced(
         cavity.result(20)
     checker._now.end()  # the spare that took its place, while it waits
     assert b'"facts"' in checker.cavity(text[1])[1]
+
+
+def test_a_part_that_the_server_has_read_is_not_read_again(
+    checker: Checker, text: tuple[Path, str]
+) -> None:
+    """The note of the part that was given is not one that the file would give."""
+    design = load_design(text[0])
+    part = replace(preview_part(design).mesh, notes=("read by the server",))
+    for _ in range(2):
+        number, cavity = checker.cavity(text[1], part=part)
+        assert b"read by the server" in cavity
+        assert b"read by the server" in checker.reach(number)
+    assert checker._spare is not None

@@ -59,11 +59,16 @@ def test_a_part_becomes_a_design_that_opens(front: Served, tmp_path: Path) -> No
     wishes = {"unit": "mm", "material": "IN718", "coverage": "200", "ball-mm": "1.2",
               "calibration": "machine.toml"}  # fmt: skip
     started = front.ask("/propose", PROPOSED | known | wishes)
-    assert started["out"] == "part"
+    assert started["result"] == "part"
     assert "running" in front.ask("/propose", PROPOSED)["error"]
     while (now := json.loads(front.get("/status").read()))["exit"] is None:
         time.sleep(0.2)
     assert now["exit"] == 0, now["lines"]
+    told = now["proposal"]
+    assert {row["name"] for row in told["rows"]} >= {"target", "chamber", "balls", "time"}
+    assert told["matters"][0]["mark"] == "Chosen by size alone"
+    assert sum(one["is_target"] for one in told["choices"]) == 1
+    assert now["picture"][0] == "part/design.png"
     design = load_design(tmp_path / "part" / "design.toml")
     assert design.calibration is not None
     assert design.process.coverage_percent == 200
