@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.proposed_target import area_in_mm2
 from chamberopt.common.errors import one_line
@@ -65,7 +64,7 @@ class Choice:
         text: its area, and its number of faces.
         place: a place on it [mm], in the frame of the part's file; "" for one that the file names.
         alone: the names of its single faces, if they are few.
-        is_target: whether it is the proposed target.
+        is_target: whether it is the proposed target, or an end of it is left bare.
     """
 
     name: str
@@ -113,12 +112,12 @@ def proposal_in_words(made: Proposal, left_out: Sequence[LeftOut]) -> ProposalIn
         keys_of = " and ".join(f"part.target.{key}" for key in one.keys)
         leave = f": {keys_of} in the design leave it out" if keys_of else ""
         settle.append(f"{one.text}{leave}")
-    target = chosen_triangles(made.mesh, made.design.part.target)
+    target = _target(made)
     return ProposalInWords(
         _sentence(made),
         tuple(rows),
         tuple(_matter(text) for text in settle),
-        tuple(_choice(one, bool((one.triangles == target).all())) for one in made.known),
+        tuple(_choice(one, one.name == target) for one in made.known),
     )
 
 
@@ -194,20 +193,23 @@ def _sentence(made: Proposal) -> str:
     """Return what is proposed in one sentence."""
     design, part = made.design, made.chamber.part
     balls = " and then ".join(_balls(made))
-    target = made.reasons["part.target"].partition(": ")[0]
     area = area_in_mm2(float(part.area[part.target].sum()))
     return (
-        f"Peen {one_line(target)} ({area}) of {one_line(design.part.mesh_path.name)} for "
+        f"Peen {one_line(_target(made))} ({area}) of {one_line(design.part.mesh_path.name)} for "
         f"{time_in_words(design.process.treatment_time)} with {balls}, the sonotrode at "
         f"{design.sonotrode.zero_to_peak_um:g} µm zero-to-peak."
     )
 
 
+def _target(made: Proposal) -> str:
+    """Return the name of the proposed target."""
+    return made.reasons["part.target"].partition(": ")[0]
+
+
 def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     """Yield name and value of each row, and the keys whose reasons belong to it."""
     tables, design = made.tables, made.design
-    target = made.reasons["part.target"].partition(": ")[0]
-    yield "target", one_line(target), ("part.target", "part.target.reachable")
+    yield "target", one_line(_target(made)), ("part.target", "part.target.reachable")
     yield "part", f"{tables['materials']['part']}", ("part.unit", "materials.part")
     pose = made.reasons.get("part.rotate_deg", "").partition(": ")[0]
     yield "pose", pose, ("part.rotate_deg", "effects.part_turn")
