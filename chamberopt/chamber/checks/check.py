@@ -78,23 +78,28 @@ def touched(design: Design, chamber: Chamber) -> np.ndarray:
 
 
 def warnings(design: Design, chamber: Chamber) -> list[str]:
-    """Return warnings about values that are allowed but probably not intended, with remedies."""
+    """Return warnings about values that are allowed but probably not intended, with remedies.
+
+    What stops or harms the process comes first, then what is not peened, then what makes figures
+    less sure.
+    """
     if chamber.steps:
         return _step_warnings(design, chamber)
     reach = shot_reach(design, chamber)
-    texts = first_warnings(design, chamber, reach.mesh)
+    texts = _wall_warnings(design, chamber, reach) + first_warnings(design, chamber, reach.mesh)
     for name, surface in _to_be_peened(design, chamber).items():
         texts += surface_warnings(reach, surface, name, design.part.target.reachable)
-    texts += _wall_warnings(design, chamber, reach)
-    return texts + fillet_warnings(reach, chamber, max(design.shot.diameters))
+    texts += fillet_warnings(reach, chamber, max(design.shot.diameters))
+    return texts + facet_warnings(
+        chamber.part, reach.diameter, reached_share(reach, chamber.on_target)
+    )
 
 
 def _wall_warnings(design: Design, chamber: Chamber, reach: Reach) -> list[str]:
-    """Return warnings about facets, pockets and gaps, from where the shot reaches."""
-    texts = facet_warnings(chamber.part, reach.diameter, reached_share(reach, chamber.on_target))
-    texts += pocket_warnings(reach, chamber)
+    """Return warnings about gaps and pockets, from where the shot reaches."""
     turns = design.effects.part_turn is not None
-    return [*texts, *gap_warnings(reach, chamber, design.shot.diameters, turns)]
+    gaps = gap_warnings(reach, chamber, design.shot.diameters, turns)
+    return [*gaps, *pocket_warnings(reach, chamber)]
 
 
 def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
@@ -110,10 +115,14 @@ def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
         own = reached_part_share(reach, room.source, len(part.triangles))
         shares = np.maximum(shares, own * room.exposed_area)
         balls.add(f"{1e3 * reach.diameter:g}")
-        walls = _wall_warnings(one, room, reach)
+        texts = [
+            *_wall_warnings(one, room, reach),
+            *first_warnings(one, room, reach.mesh, False),
+        ]
         if max(one.shot.diameters) == finest:
-            walls += fillet_warnings(reach, room, finest)
-        found[name] = [*first_warnings(one, room, reach.mesh, False), *walls]
+            texts += fillet_warnings(reach, room, finest)
+        share = reached_share(reach, room.on_target)
+        found[name] = [*texts, *facet_warnings(room.part, reach.diameter, share)]
     texts = told_of_steps(found)
     spared = {one.name for one in design.zones if one.is_spared}
     wanted = {TARGET: part.target}
@@ -139,17 +148,13 @@ def first_warnings(
         of_surfaces: whether a target that is partly outside the chamber is warned of. One of
             several steps need not have all of it inside.
     """
-    shot, texts = design.shot, []
+    shot = design.shot
+    texts = _sonotrode_warnings(design, mesh, turning_axis(design, chamber.part))
     filled = shot.volume / chamber.volume
     if filled > MAX_PACKING_FRACTION:
         texts.append(
             f"the balls fill {filled:.0%} of the free volume; above {MAX_PACKING_FRACTION:.0%} "
             "they hinder each other: lower shot.mass_g or enlarge the chamber"
-        )
-    if abs(shot.count * shot.ball_mass - shot.mass) > 0.05 * shot.mass:
-        texts.append(
-            f"shot.mass_g = {shot.mass_g:g} is rounded to {shot.count} whole ball(s) of "
-            f"{shot.ball_mass * 1e6:.3g} mg: the charge differs by more than 5 %"
         )
     for name, surface in _to_be_peened(design, chamber).items() if of_surfaces else ():
         if (hidden := hidden_share(surface)) > MAX_HIDDEN_SHARE:
@@ -158,6 +163,9 @@ def first_warnings(
                 f"covered: enlarge the chamber, or narrow {selection_of(name)} to what is to be "
                 "peened"
             )
+    texts += _mask_warnings(chamber)
+    texts += _side_wall_warnings(design, chamber)
+    texts += [ledge.message for ledge in find_ledges(design, chamber) if ledge.level]
     path = free_path(design, chamber)
     if not design.effects.ball_collisions and path < MIN_FREE_PATH:
         texts.append(
@@ -172,11 +180,12 @@ def first_warnings(
             f"last only {plain(recorded, 3)} s: coverage is that of some of its positions; raise "
             "process.accuracy.simulated_time_s or replicas"
         )
-    texts += _mask_warnings(chamber)
-    texts += calibration_warnings(design)
-    texts += _sonotrode_warnings(design, mesh, turning_axis(design, chamber.part))
-    texts += _side_wall_warnings(design, chamber)
-    return texts + [ledge.message for ledge in find_ledges(design, chamber) if ledge.level]
+    if abs(shot.count * shot.ball_mass - shot.mass) > 0.05 * shot.mass:
+        texts.append(
+            f"shot.mass_g = {shot.mass_g:g} is rounded to {shot.count} whole ball(s) of "
+            f"{shot.ball_mass * 1e6:.3g} mg: the charge differs by more than 5 %"
+        )
+    return texts + calibration_warnings(design)
 
 
 def _to_be_peened(design: Design, chamber: Chamber) -> dict[str, Chamber]:
