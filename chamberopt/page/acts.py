@@ -31,7 +31,7 @@ from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
-from chamberopt.page.structure import picked_surfaces, restructured
+from chamberopt.page.structure import picked_surfaces, restructured, with_added_step
 from chamberopt.page.study_answers import candidate_answer, candidates_answer, model_answer, version
 from chamberopt.printers import terminal
 from chamberopt.printers.html import section
@@ -129,6 +129,14 @@ class Acts:
         """Return changes after which the design has another shape or kind of holder."""
         file, name, wanted = self._file(asked), str(asked["name"]), str(asked["value"])
         return restructured(file.design, asked["changes"], name, wanted, file.with_changes)
+
+    def step(self, asked: Any) -> dict[str, object]:
+        """Return changes after which the design has a further step."""
+        changes, name = asked["changes"], str(asked["name"])
+        design = self._file(asked).with_changes(changes)
+        made = with_added_step(design, changes, name, int(asked["step"]))
+        self._file(asked).with_changes(made)  # so that a wrong name is told at once
+        return made
 
     def cavity(self, asked: Any) -> bytes:
         file = self._file(asked)

@@ -192,7 +192,7 @@ class EditedFile:
                 if value is None:
                     return
                 if steps[k + 1].isdecimal():  # a list that the file leaves at its default
-                    present = list(self._present(steps[: k + 1]))
+                    present = list(self._present(steps[: k + 1]) or ())
                     table[step] = present or tomlkit.aot()
                 else:
                     table.append(step, tomlkit.table())

@@ -1,10 +1,11 @@
-"""Change the chamber's shape, or the kind of holder or mask, of the design that a page edits.
+"""Change the chamber's shape, the kind of holder or mask, or add a step, in an edited design.
 
 Each shape and each kind has keys of its own, which a change takes out or puts in.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -28,6 +29,15 @@ MASK_KINDS: dict[str, dict[str, Any]] = {
     "block": {},  # with an axis, which the way of its faces gives
 }
 OF_MASK = ("axis", "plugs", "thickness_mm")  # keys that a mask may have beside its faces
+STEP = re.compile(r"steps\.(\d+)(?=\.|$)")
+FIRST = "first"  # name of the step that the design without steps becomes
+# Tables whose keys a step may change on the page, and those that a further step is given.
+OF_STEP: dict[str, tuple[str, ...]] = {
+    "part": (),
+    "chamber": (),
+    "sonotrode": ("amplitude_um", "amplitude_pv_um"),
+    "shot": ("mass_g", "diameter_mm"),
+}
 # Keys of a chamber that stay, with their values, when its shape changes; and those of its shapes.
 STAY = {*ParametricChamber.model_fields} - {"shape"}
 OF_SHAPES = {key for name in SHAPES for key in shapes.SHAPES[name].model_fields} - STAY - {"shape"}
@@ -74,7 +84,11 @@ def picked_surfaces(design: Design) -> dict[str, str]:
 
 
 def may_change(design: Design, name: str, value: object) -> bool:
-    """Return True if a page may give a key of shape, holder or mask of a design this value."""
+    """Return True if a page may give a key of shape, holder, mask or an added step this value."""
+    if found := STEP.match(name):
+        inner = name[found.end() :]
+        is_added = int(found[1]) >= len(design.steps or ())
+        return is_added and (_is_number(value) if inner else _is_step(value))
     choices, (table, _, key) = structure_choices(design), name.partition(".")
     if name in (SHAPE, KIND):
         return value in choices.get(name, ())
@@ -86,6 +100,64 @@ def may_change(design: Design, name: str, value: object) -> bool:
         first = key.partition(".")[0]
         return first in Holder.model_fields and (first != "at" or value is None)
     return table == "chamber" and SHAPE in choices and key in OF_SHAPES
+
+
+def with_added_step(
+    design: Design, changes: Mapping[str, Any], name: str, copied: int
+) -> dict[str, Any]:
+    """Return changes after which a design has a further step, which is a copy of one of its steps.
+
+    A design without steps gets two, and the first is as the design is. In the copy the pose, the
+    charge and the amplitude are given, as these differ from step to step.
+
+    Args:
+        design: the design with its changes until now.
+        changes: new values by dotted name until now.
+        name: name of the further step.
+        copied: number of the step that is copied.
+
+    Raises:
+        InputError: the step has a holder, a mask or further sonotrodes of its own.
+    """
+    steps, each = design.steps or (), [*design.in_steps.values()]
+    if not 0 <= copied < len(each):
+        raise InputError(f"step: given {copied}; allowed: from 0 to {len(each) - 1}")
+    own = steps[copied].changes if steps else {}
+    if whole := [table for table in own if table not in OF_STEP]:
+        text = f"step {steps[copied].name} has {' and '.join(whole)} of its own"
+        raise InputError(f"{text}: copy it in the file, or copy another step")
+    values = each[copied].model_dump(exclude_none=True)
+    given = {
+        table: {key: values[table][key] for key in keys if key in values[table]}
+        for table, keys in OF_STEP.items()
+    }
+    given["part"] = {"rotate_deg": [*values["part"]["rotate_deg"]]}
+    tables = {table: {**own.get(table, {}), **given[table]} for table in OF_STEP}
+    share = steps[copied].time_share if steps else 1.0
+    added = {"name": name, "time_share": share} | {key: one for key, one in tables.items() if one}
+    first = {} if steps else {"steps.0": {"name": FIRST}}
+    return {**changes, **first, f"steps.{max(len(steps), 1)}": added}
+
+
+def _is_number(value: object) -> bool:
+    return value is None or (isinstance(value, int | float) and not isinstance(value, bool))
+
+
+def _is_step(value: object) -> bool:
+    """Return True for the keys of a step if they hold numbers, and a shape that needs no file."""
+    if not isinstance(value, Mapping):
+        return False
+    tables = {key: one for key, one in value.items() if key not in ("name", "time_share")}
+    leaves = (
+        (key, one)
+        for table in tables.values()
+        if isinstance(table, Mapping)
+        for key, held in table.items()
+        for one in (held if isinstance(held, list | tuple) else [held])
+    )
+    return tables.keys() <= OF_STEP.keys() and all(
+        one in SHAPES if key == "shape" else _is_number(one) for key, one in leaves
+    )
 
 
 def restructured(

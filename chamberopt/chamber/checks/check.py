@@ -115,10 +115,7 @@ def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
         own = reached_part_share(reach, room.source, len(part.triangles))
         shares = np.maximum(shares, own * room.exposed_area)
         balls.add(f"{1e3 * reach.diameter:g}")
-        texts = [
-            *_wall_warnings(one, room, reach),
-            *first_warnings(one, room, reach.mesh, False),
-        ]
+        texts = [*_wall_warnings(one, room, reach), *first_warnings(one, room, reach.mesh, False)]
         if max(one.shot.diameters) == finest:
             texts += fillet_warnings(reach, room, finest)
         share = reached_share(reach, room.on_target)

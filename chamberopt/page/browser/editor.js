@@ -4,7 +4,7 @@ import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import "./study/study.js";
-import { ask, attempt, element, isUnsaved, listen, onPage, read, say, showStep, state, takeTold, undo, unpack, warning, wordsOf } from "./state.js";
+import { addStep, ask, attempt, element, isUnsaved, listen, onPage, read, say, showAdded, showStep, state, takeTold, undo, unpack, warning, wordsOf } from "./state.js";
 import { lookAnew, setHandles, showCavity, showPart, showShape, showState } from "./scene.js";
 
 const find = (id) => document.getElementById(id);
@@ -32,21 +32,30 @@ async function followFields() {
     makeFields();
     fillSurfaces();
     fillSteps();
+    showAdded();
   } catch (error) { if (now === shownOf) shownOf = ""; } // asked again with the next change; the shape says what is wrong
 }
 
 // The steps of the design; the view shows the chamber of one.
 function fillSteps() {
-  find("steps").hidden = !state.steps.length;
+  find("step-buttons").hidden = !state.steps.length;
+  find("steps").hidden = state.file.is_drawn && !state.steps.length;
   find("of-first").hidden = !state.step;
   find("down").disabled = state.step > 0;
   for (const one of document.querySelectorAll("input[name=handles]")) one.disabled = state.step > 0;
-  find("steps").replaceChildren(find("steps").firstElementChild, ...state.steps.map((text, k) => {
+  find("step-buttons").replaceChildren(...state.steps.flatMap((text, k) => {
     const button = element("button", { textContent: text, ariaPressed: String(k === state.step) });
     button.addEventListener("click", () => { if (k !== state.step) showStep(k); });
-    return button;
+    return [button, " "];
   }));
 }
+find("add-step").addEventListener("click", () => attempt(async () => {
+  const name = find("step-name").value.trim();
+  if (!name) throw new Error("give the new step a name first, such as turned");
+  await addStep(name);
+  find("step-name").value = "";
+  find("new-step").open = false;
+}));
 
 // The shape follows at once: the newest changes are asked for as soon as the last answer is here.
 let asking = false, asked = null, timer = 0, round = 0;

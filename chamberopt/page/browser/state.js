@@ -76,8 +76,23 @@ export function change(values, move = "") {
 }
 
 // Change the chamber's shape or the holder, with the keys that go with it, to which the server gives values.
-export async function restructure(name, wanted) {
-  const before = state.changes, made = await ask("/structure", { changes: before, name, value: wanted });
+export const restructure = (name, wanted) => changeBy("/structure", { name, value: wanted });
+
+// Add a copy of the step that is shown, and show the copy.
+let added = Infinity; // number of a step that is not shown yet
+export async function addStep(name) {
+  const count = Math.max(state.steps.length, 1);
+  await changeBy("/step", { name, step: state.step });
+  added = count;
+}
+export function showAdded() {
+  if (added >= state.steps.length) return;
+  showStep(added);
+  added = Infinity;
+}
+
+async function changeBy(path, asked) {
+  const before = state.changes, made = await ask(path, { changes: before, ...asked });
   if (state.changes !== before) return; // something else was changed meanwhile
   say("");
   state.past.push(before);

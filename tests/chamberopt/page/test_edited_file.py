@@ -10,7 +10,7 @@ import trimesh
 
 from chamberopt.common.errors import InputError
 from chamberopt.page.edited_file import EditedFile, design_fields
-from chamberopt.page.structure import restructured
+from chamberopt.page.structure import restructured, with_added_step
 from tests.helpers.mesh_files import write_stl
 from tests.hunt.base import write_base
 
@@ -49,6 +49,9 @@ def test_one_number_is_one_line(file: EditedFile) -> None:
         ({"part.rotate_deg.-1": 3}, None),
         ({"part.rotate_deg.1": None}, None),
         ({"zones.0.name": "x"}, None),
+        ({"steps.0": {"name": "a", "holder": {"kind": "rod"}}}, None),
+        ({"steps.0": {"name": "a", "chamber": {"shape": "shape.py"}}}, None),
+        ({"steps.1.part.mesh": "/x", "steps.0": {"name": "a"}, "steps.1": {"name": "b"}}, None),
         ({"process.accuracy.max_replicas": 9}, ["+max_replicas = 9"]),
         ({"effects.friction.mu": 0.2, "effects.friction.beta0": 0.3},
          ["+[effects.friction]", "+mu = 0.2", "+beta0 = 0.3"]),
@@ -223,3 +226,26 @@ def test_a_shape_that_is_not_offered_is_refused(file: EditedFile) -> None:
             file.save({name: wanted})
     with pytest.raises(InputError, match=r"holder\.at: not changed on the page"):
         file.save({"holder.at": {"surface": "all"}})
+
+
+def test_a_step_is_added_as_a_copy_whose_numbers_are_then_changed(file: EditedFile) -> None:
+    """The first step is the design itself; the copy turns, and is copied with its turn."""
+    before = file.path.read_text()
+    once = with_added_step(file.design, {}, "turned", 0)
+    once |= {"steps.1.part.rotate_deg.0": 180.0, "steps.1.time_share": 3.0}
+    twice = with_added_step(file.with_changes(once), once, "again", 1)
+    assert [one.name for one in file.with_changes(once).steps or ()] == ["first", "turned"]
+    file.save(twice)
+    design = EditedFile(file.path, False).design
+    first, turned, again = design.in_steps.values()
+    assert first.part.rotate_deg == (0.0, 0.0, 10.0)
+    assert turned.part.rotate_deg == again.part.rotate_deg == (180.0, 0.0, 10.0)
+    assert turned.shot == first.shot
+    assert turned.process.treatment_time == pytest.approx(3 * first.process.treatment_time)
+    assert not [one for one in differing(before, file.path.read_text()) if one[0] == "-"]
+
+
+@pytest.mark.parametrize("name", ["first", "two words", ""])
+def test_a_step_has_a_name_of_its_own(file: EditedFile, name: str) -> None:
+    with pytest.raises(InputError, match=r"steps\.1\.name"):
+        file.with_changes(with_added_step(file.design, {}, name, 0))

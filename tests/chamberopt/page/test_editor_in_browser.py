@@ -128,6 +128,24 @@ def test_shape_and_holder_are_chosen_in_words(opened: Page) -> None:
     assert page.locator("#undo").is_disabled()
 
 
+def test_a_step_is_added_and_shown(opened: Page) -> None:
+    page = opened.page
+    page.click("#new-step summary")
+    page.fill("#step-name", "turned")
+    page.click("#add-step")
+    buttons = page.locator("#step-buttons button")
+    expect(buttons).to_have_count(2, timeout=WAIT)
+    expect(buttons.nth(1)).to_have_attribute("aria-pressed", "true")
+    expect(buttons.nth(1)).to_contain_text("turned: ")
+    opened.put("steps.1.part.rotate_deg.0", 180)
+    opened.wait("data-checked=reach")
+    assert page.locator("#error").is_hidden()
+    page.click("#undo")
+    page.click("#undo")
+    expect(buttons).to_have_count(0, timeout=WAIT)
+    opened.wait("data-checked=reach")
+
+
 def test_what_is_refused_is_said_and_the_newest_counts(opened: Page) -> None:
     opened.put("chamber.height_mm", 4)
     expect(opened.page.locator("#error")).to_contain_text("not below height of the chamber = 4")
