@@ -24,7 +24,7 @@ from chamberopt.design.design import Design, validate
 from chamberopt.design.fixture import HOLDER_KEYS, Holder
 from chamberopt.design.materials import BY_NAME
 from chamberopt.design.shapes.base import is_custom
-from chamberopt.page.page_words import choices
+from chamberopt.page.page_words import choices, on_page
 from chamberopt.page.structure import (
     KIND,
     MASK_KIND,
@@ -264,6 +264,7 @@ def _table(value: dict[str, object]) -> object:
 
 # Fields of the page: each number and choice of a design with unit, bounds and description.
 
+SHARE = "_share"  # end of the name of a share
 # Tables without fields: their numbers are measured, or chosen by clicks on the part, or mesh the
 # part, which would become another part.
 NOT_SHOWN = (
@@ -284,7 +285,9 @@ def design_fields(file: EditedFile) -> list[dict[str, object]]:
     for name, field in _numbers(design):
         row: dict[str, Any] = {"name": name, "value": _value(design, name), **_bounds(field)}
         extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
-        row |= {"unit": extra.get("unit", "") or unit_of(name), "text": field.description or ""}
+        unit = extra.get("unit", "") or unit_of(name)
+        # A file has shares as fractions, or as parts of a sum.
+        row |= {"unit": "" if name.endswith(SHARE) else unit, "text": field.description or ""}
         row |= {"whole": field.annotation is int, "varies": name in varied}
         row |= {"fixed": file.is_fixed(name)}
         rows.append(row | {"reason": reasons.get(name.removesuffix(".0"), "")})
@@ -300,7 +303,9 @@ def design_fields(file: EditedFile) -> list[dict[str, object]]:
         row |= {"reason": reasons.get(name, "")}
         rows.append(row)
     return [
-        row | _words(design, row["name"]) | {"reason": _new(row["reason"], row["text"])}
+        row
+        | _words(design, row["name"])
+        | {"reason": on_page(_new(row["reason"], row["text"])), "text": on_page(row["text"])}
         for row in [*_structure_rows(file), *rows]
     ]
 
@@ -322,8 +327,8 @@ def _words(design: Design, name: str) -> dict[str, str]:
     return {
         "table": table,
         "group": group[0].upper() + group[1:],
-        "label": title(key),
-        "in_full": title_with_unit(name),
+        "label": f"{title(key)} share" if key.endswith(SHARE) else title(key),
+        "in_full": title(name) if key.endswith(SHARE) else title_with_unit(name),
     }
 
 

@@ -40,6 +40,7 @@ OPTIONS = {
     "calibration": "calibration of the machine",
     "no-pilot": "the choice not to simulate",
 }
+KEYS = {"holder.at": "faces of the holder", "mask.at": "faces of the mask"}
 _TABLES = (
     "part|chamber|shot|sonotrode|sonotrodes|materials|effects|process|holder|mask|zones|"
     "tolerances|ranges"
@@ -65,7 +66,7 @@ def on_page(text: str) -> Words:
         if found.lower().endswith(_FILES):
             continue
         key = found.strip("[]").removeprefix("effects.")
-        words = OPTIONS.get(found[2:]) or inner_first(key)
+        words = OPTIONS.get(found[2:]) or KEYS.get(key) or inner_first(key)
         words = "guide" if found.startswith("docs/") else words
         made += [text[at : match.start()]] * (match.start() > at)
         made.append((words, found))

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Lock, Thread
@@ -33,6 +34,7 @@ class StartedCommand:
         self._lines: list[str] = []
         self._answer: list[str] = []  # lines of JSON, of a command that was asked for JSON
         self._steps: dict[str, dict[str, Any]] = {}
+        self._began = time.monotonic()
         self._process = start_python(
             COMMAND,
             *arguments,
@@ -71,6 +73,7 @@ class StartedCommand:
         return {
             "command": f"chamberopt {' '.join(self.arguments)}",
             "result": self._result,
+            "seconds": round(time.monotonic() - self._began),
             "steps": [] if code is not None else list(self._steps.values()),
             "lines": lines,
             "warnings": [on_page(text) for text in warnings],

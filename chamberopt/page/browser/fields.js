@@ -1,5 +1,5 @@
 // A slider and a field for every number of the design, grouped by its tables; the ends of sliders bound a study.
-import { attempt, change, element, endMove, original, restructure, say, state, value } from "./state.js";
+import { attempt, change, element, endMove, onPage, original, restructure, say, state, value } from "./state.js";
 
 const OPEN = ["chamber", "shot", "sonotrode"], POSE = ["part.rotate_deg", "part.offset_mm"];
 const rows = new Map();
@@ -29,8 +29,8 @@ export function makeFields() {
 
 // What a number is, in words, and why the file has it; its key is the tip.
 const label = (field) => element("label", { title: `${field.name} in the file`, htmlFor: field.name },
-  element("b", { textContent: field.label }), ` ${field.text}`,
-  ...(field.reason && field.reason !== field.text ? [element("small", { textContent: field.reason })] : []));
+  element("b", { textContent: field.label }), " ", ...onPage(field.text),
+  ...(field.reason.length ? [element("small", {}, ...onPage(field.reason))] : []));
 
 function choiceRow(field) {
   const select = element("select", { id: field.name }, ...field.choices.map(([value, textContent]) => element("option", { value, textContent })));

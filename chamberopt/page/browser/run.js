@@ -1,7 +1,7 @@
 // Running the commands on what is saved, and writing a study from the sliders.
 import { ask, attempt, element, isUnsaved, say, state, read } from "./state.js";
 import { ends, varied } from "./fields.js";
-import { bars, followed } from "./steps.js";
+import { bars, followed, sinceBegin } from "./steps.js";
 
 const find = (id) => document.getElementById(id);
 
@@ -47,14 +47,14 @@ let study = "";
 // Show a command that runs, by default what the server has started last, and give its exit status.
 export const follow = async (started) => (await followed(show, started))?.exit ?? null;
 
-function show({ command, result, steps, lines, exit }) {
+function show({ command, result, steps, seconds, lines, exit }) {
   const before = study;
   study = exit === null && command.startsWith("chamberopt run ") ? result : "";
   if (study && study !== before) document.dispatchEvent(new CustomEvent("running", { detail: study }));
   find("stop").disabled = exit !== null;
   isRunning = exit === null;
   allow();
-  const now = exit === null ? "running" : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
+  const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
   find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps));
   find("printed").textContent = lines.join("\n");
   find("printed-fold").hidden = !lines.length;

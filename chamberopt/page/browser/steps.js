@@ -28,6 +28,9 @@ function left({ step, done, total }) {
   return `, about ${seconds < 90 ? `${Math.ceil(seconds / 5) * 5} s` : `${Math.ceil(seconds / 60)} min`} left`;
 }
 
+// For how long a command has worked.
+export const sinceBegin = (seconds) => seconds < 120 ? `at work for ${seconds} s` : `at work for ${Math.floor(seconds / 60)} min`;
+
 export const bars = (steps) => {
   for (const step of begun.keys()) if (!steps.some((one) => one.step === step)) begun.delete(step);
   return steps.map((one) => element("div", {},
