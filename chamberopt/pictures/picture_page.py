@@ -208,8 +208,9 @@ def _draw_dimension(axes: Axes, panel: Panel, one: Dimension) -> None:
     angle = float(np.degrees(np.arctan2(-along[1], along[0])))
     angle = (angle + 90.0) % 180.0 - 90.0 if abs(abs(angle) - 90.0) > 1e-6 else 90.0
     x, y = 0.5 * (ends[0] + ends[1]) + 19.0 * away
-    axes.text(x, y, one.text, rotation=angle, ha="center",
-              va="center", rotation_mode="anchor", fontsize=SMALL, color=DARK_GREY)  # fmt: skip
+    clear = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}  # of lines of others
+    axes.text(x, y, one.text, rotation=angle, ha="center", va="center", bbox=clear, zorder=5,
+              rotation_mode="anchor", fontsize=SMALL, color=DARK_GREY)  # fmt: skip
 
 
 def _draw_bar(axes: Axes, bar: ColourBar) -> None:

@@ -89,7 +89,7 @@ function lookAtAll() {
   const low = inner.map((x, i) => Math.min(x, Math.max(x - room, placed.part_mm[0][i])));
   const high = outer.map((x, i) => Math.max(x, Math.min(x + room, placed.part_mm[1][i])));
   const size = Math.hypot(...high.map((x, i) => x - low[i])), centre = mid(low, high), way = wayToTarget();
-  view.look({ middle: centre, eye: centre.map((x, i) => x + 2.3 * size * way[i]), size });
+  view.look({ middle: centre, eye: centre.map((x, i) => x + 2.6 * size * way[i]), size });
 }
 
 view.renderer.domElement.addEventListener("dblclick", () => { if (placed) lookAtAll(); });

@@ -57,9 +57,10 @@ class View3D {
     pen.font = font;
     canvas.width = Math.ceil(pen.measureText(text).width) + 16;
     canvas.height = 64;
-    Object.assign(pen, { font, fillStyle: colour, textBaseline: "middle", strokeStyle: "rgba(255,255,255,0.85)", lineWidth: 8 });
-    pen.strokeText(text, 8, 32);
-    pen.fillText(text, 8, 32);
+    Object.assign(pen, { font, fillStyle: "rgba(255,255,255,0.8)", textBaseline: "middle" }); // clear of lines behind it
+    pen.fillRect(0, 0, canvas.width, canvas.height);
+    pen.fillStyle = colour;
+    pen.fillText(text, 8, 34);
     const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(canvas), depthTest: false }));
     sprite.scale.set(height * canvas.width / canvas.height, height, 1);
     sprite.position.set(...at);
