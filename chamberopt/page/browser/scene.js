@@ -121,7 +121,7 @@ function wayToTarget() {
 // Sizes of the chamber and of the part's box, its height over the sonotrode, and the axes of the part's file.
 function dimensions() {
   const [low, high] = placed.shape_mm, [a, b] = placed.part_mm, size = Math.hypot(...high.map((x, i) => x - low[i]));
-  const text = 0.026 * size, gap = 0.06 * size;
+  const text = 0.03 * size, gap = 0.06 * size;
   const ends = [
     [low[0], low[1] - gap, 0], [high[0], low[1] - gap, 0],
     [high[0] + gap, high[1], 0], [high[0] + gap, high[1], high[2]],
