@@ -246,11 +246,11 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
     metal, middle = alloy(made.tables["materials"]["part"]), _depth(made, 0.5)
     expected = "not known: the pilot left hardly a dent"
     if predicted is not None:
-        expected = f"expected: {_with_strip(predicted)}"
+        expected = f"expected {_with_strip(predicted)}"
     usual = usual_intensity(metal, middle)
     beside = why_none(metal, middle)
     if usual is not None:
-        beside = f"{usual.low:g}-{usual.high:g}A are {usual.text}: --intensity usual"
+        beside = f"{usual.low:g}-{usual.high:g}A are {usual.text}; to aim at it: --intensity usual"
     return replace(made, reasons={**made.reasons, INTENSITY: f"{expected}; {beside}"})
 
 

@@ -218,7 +218,7 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
     chosen = {one.name: one for one in (_find(mesh, known, name) for name in wanted)}
     if chosen:
         whole = [one for one in chosen.values() if one.keys == WHOLE and one.triangles.all()]
-        return _joined(whole or list(chosen.values()), "as --target asks")
+        return _joined(whole or list(chosen.values()), "as asked (--target)")
     named, faces = (
         [one for one in known if ("surface" in one.keys) is kind] for kind in (True, False)
     )

@@ -316,7 +316,7 @@ def test_without_a_wish_the_expected_intensity_stands_beside_the_usual_one(
     assert "not known" in with_expected_intensity(made, None).reasons[INTENSITY]
     predicted = PredictedIntensity(0.31, 0.05, 1.9, 2.5)
     told = with_expected_intensity(made, predicted).reasons[INTENSITY]
-    assert "expected: 0.31 mmA x/÷ 2.5; 0.15-0.25A are usual for titanium of 8 mm" in told
+    assert "expected 0.31 mmA x/÷ 2.5; 0.15-0.25A are usual for titanium of 8 mm" in told
     assert "THIN" not in told
     wanted = usual_for(made)
     assert (wanted.low, wanted.high) == (0.15, 0.25)
