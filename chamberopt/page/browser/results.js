@@ -18,7 +18,12 @@ async function refresh() {
     }
     for (const [command, file, name] of row.unusable ? [] : FILES) {
       const button = element("button", { textContent: row[file] ? name : `make the ${name}` });
-      button.addEventListener("click", () => attempt(() => open(command, row.folder, file, row[file])));
+      button.addEventListener("click", async () => {
+        const before = button.textContent;
+        if (!row[file]) Object.assign(button, { disabled: true, className: "at-work", textContent: `making the ${name} …` });
+        await attempt(() => open(command, row.folder, file, row[file]));
+        Object.assign(button, { disabled: false, className: "", textContent: before }); // where it could not be made
+      });
       item.append(button, " ");
     }
     return item;
