@@ -111,8 +111,8 @@ def test_every_number_has_its_bounds_unit_and_description(file: EditedFile) -> N
     rows = {row["name"]: row for row in design_fields(file)}
     assert rows["chamber.height_mm"] == {
         "name": "chamber.height_mm", "value": 30.0, "least": 2.0, "most": 2000.0, "unit": "mm",
-        "text": "inner height, sonotrode to ceiling", "whole": False, "varies": True,
-        "fixed": False, "reason": "to try", "table": "chamber", "group": "Chamber",
+        "text": ["inner height, sonotrode to ceiling"], "whole": False, "varies": True,
+        "fixed": False, "reason": ["to try"], "table": "chamber", "group": "Chamber",
         "label": "Height", "in_full": "Chamber height [mm]",
     }  # fmt: skip
     assert rows["part.offset_mm.0"]["value"] == 1.0
