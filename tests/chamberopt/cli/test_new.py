@@ -287,7 +287,7 @@ def test_a_usual_intensity_that_no_pilot_tells_is_no_reason_to_stop(
     words = ["new", "box.stl", "--unit", "mm", "--material", "Ti-6Al-4V"]
     assert main(words) == 0
     said = capfd.readouterr().out
-    assert "intensity    expected: 0.9 mmA x/÷ 2.5\n" in said
+    assert "intensity    expected 0.9 mmA x/÷ 2.5\n" in said
     assert "0.15-0.25A are usual for titanium" in said
     assert main([*words, "--intensity", "usual", "--out", "asked"]) == 2
     assert "--intensity: the shot hardly dents a strip" in capfd.readouterr().err
