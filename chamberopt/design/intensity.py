@@ -47,6 +47,7 @@ FORM = (
     "as 0.15A (to 30 % or 0.076 mm above it, by SAE AMS 2430); in mm of an A, N or C strip"
 )
 INCH_MM = 25.4
+NEAR_ENOUGH = 1.1
 THIN_MM, THICK_MM = 0.090 * INCH_MM, 0.375 * INCH_MM
 STRONG_MPa = 1379.0  # tensile strength of steel: 200,000 psi
 TABLE = "table VI of SAE AMS-S-13165"
@@ -110,11 +111,12 @@ class WantedIntensity:
     def off(self, intensity: float) -> float:
         """Return the logarithm of the factor by which an intensity lies off the range; 0 in it.
 
-        It is negative below the range.
+        It is negative below the range. Up to NEAR_ENOUGH beside the range counts as in it, as no
+        simulation without strips tells it better.
         """
         if intensity <= 0.0:
             return -math.inf
-        if self.low <= intensity <= self.high:
+        if self.low / NEAR_ENOUGH <= intensity <= self.high * NEAR_ENOUGH:
             return 0.0
         return math.log(intensity / (self.low if intensity < self.low else self.high))
 
@@ -230,9 +232,9 @@ class Comparison:
         if standing == NOT_DECIDED:
             shown = float(f"{predicted.value:.2g}")  # as it is told
             where = INSIDE if wanted[0] <= shown <= wanted[1] else OUTSIDE
-            words = f"{NOT_DECIDED}: the value is {where}, the interval is not"
+            words = f"{NOT_DECIDED}: expected {where}, but the interval is wider than the range"
             if where == OUTSIDE:
-                words = f"{NOT_DECIDED}: the value is {where}, the interval not wholly"
+                words = f"{NOT_DECIDED}: expected {where}, with an end of the interval inside"
         return cls(standing, words, predicted.in_words)
 
 

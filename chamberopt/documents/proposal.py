@@ -110,7 +110,8 @@ def proposal_in_words(made: Proposal, left_out: Sequence[LeftOut]) -> ProposalIn
         rows.append(Row(name, value, tuple(reasons)))
     for one in left_out:
         keys_of = " and ".join(f"part.target.{key}" for key in one.keys)
-        leave = f": {keys_of} in the design leave it out" if keys_of else ""
+        many = "" if len(one.keys) > 1 else "s"
+        leave = f": {keys_of} in the design leave{many} it out" if keys_of else ""
         settle.append(f"{one.text}{leave}")
     target = _target(made)
     return ProposalInWords(
@@ -223,12 +224,12 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     for table, name in (("holder", "held by"), ("mask", "masked by")):
         own = {key: one for key, one in tables.items() if key.partition(".")[0] == table}
         if own:
+            kind = own.get(table, {}).get("kind", "pad" if "axis" in own.get(table, {}) else "")
             sizes = ", ".join(
-                f"{in_words(key)} {value:g} mm"
+                f"{'flange ' * (kind == 'arbor' and key != 'grip_mm')}{in_words(key)} {value:g} mm"
                 for one in own.values()
                 for key, value in _numbers(one)
             )
-            kind = own.get(table, {}).get("kind", "pad" if "axis" in own.get(table, {}) else "")
             keys = tuple(f"{one}.{key}" for one, values in own.items() for key in values)
             value = ", ".join(filter(None, (KINDS.get(kind, str(kind)), sizes)))
             whys = [why for key in keys for why in clauses(made.reasons.get(key, ""))[0]]

@@ -342,7 +342,7 @@ def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
         raise InputError(f"--shot: given {name!r}; {text}; give one of {known}")
     hardness = alloy(part).hardness_HB
     is_implant, metal = IMPLANT in part.split(), alloy(part).metal
-    if not name and (is_implant or metal == "aluminium") and _has(shop, CERAMIC):
+    if not name and (is_implant or metal in IRON) and _has(shop, CERAMIC):
         return CERAMIC, f"steel leaves iron on {'an alloy of implants' if is_implant else metal}"
     if name or (ball(STEEL).hardness_HB or 0.0) >= HARDER * hardness or not _has(shop, HARD):
         found = ball(name or STEEL).name
@@ -534,8 +534,9 @@ def _floor_reasons(floor: Floor, is_local: bool, goes_out: bool) -> dict[str, st
         "zero-to-peak, half of" if key == "amplitude_um" else "peak-to-valley, twice zero-to-peak"
     )
     kind += " peak-to-valley" if key == "amplitude_um" else ""
+    room = f"leaves at least {1e3 * sizes.gap:.3g} mm beside the {beside}"
     return {
-        f"chamber.{first}": f"leaves {1e3 * sizes.gap:.3g} mm beside the {beside}; {floor.reason}",
+        f"chamber.{first}": f"{room}; {floor.reason}",
         "chamber.height_mm": f"sonotrode to ceiling{where}",
         "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point",
         **({"sonotrode.frequency_khz": one.note} if one.note else {}),

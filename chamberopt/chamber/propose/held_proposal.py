@@ -116,9 +116,8 @@ def _outside_in_words(made: Proposal) -> str:
     sides = [f"{sign}{'xyz'[k]}" for sign, room in signs for k in range(3) if room[k] < -SEEN_OUT]
     outside, areas = part.area - chamber.exposed_area, {}
     for one in named_or_all(made.known):
-        rows = rows_of(made.design, one.keys)
-        if not np.any(rows & part.target):
-            areas[one.name] = float(outside[rows].sum())
+        rows = rows_of(made.design, one.keys) & ~part.target
+        areas[one.name] = float(outside[rows].sum())
     least = JAW_SHARE * max(areas.values(), default=0.0)
     most = sorted((one for one in areas if areas[one] > least), key=lambda one: -areas[one])
     jaws = ", ".join(f"{one} ({area_in_mm2(areas[one])} of it)" for one in most[:MOST_JAWS])
@@ -201,11 +200,13 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     text = (
         f"PLACES ARE LEFT OUT, {hidden:.1%} of the target, which no ball touches here, such as at"
     )
-    text += f" {place}: agree on it, or take smaller balls (--ball-mm)"
+    text += f" {place} in the chamber: agree on it, or take smaller balls (--ball-mm)"
     if (radius := _narrow_fillets(made, left)) > 0.0:
-        text = f"FILLETS ARE LEFT OUT, of about {1e3 * radius:.2g} mm, {hidden:.1%} of the target, "
-        text += f"such as at {place}: they are where parts fail; take balls that are less than "
-        text += f"{2e3 * radius:.2g} mm thick (--ball-mm), or agree on it"
+        text = (
+            f"FILLETS ARE LEFT OUT, of about {1e3 * radius:.2g} mm, {hidden:.1%} of the target, "
+            f"such as at {place} in the chamber: they are where parts fail: take balls of less "
+            f"than {2e3 * radius:.2g} mm (--ball-mm), or agree on it"
+        )
     reasons = {**made.reasons, "part.target.reachable": text}
     tables = {**made.tables, "part.target": target}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)

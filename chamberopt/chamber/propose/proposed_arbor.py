@@ -132,7 +132,9 @@ def arbor_through(
         where = "through both side walls"
     else:
         return None
-    text = f"through the bore of {2e3 * bore.radius:.4g} mm, which is not peened, and {where}"
+    text = (
+        f"an arbor through the bore of {2e3 * bore.radius:.4g} mm, which is not peened, and {where}"
+    )
     if with_cups:
         cup = math.floor(4e3 * (away - BESIDE * ball)) / 2.0
         depth = _depth_of_seat(bore, mesh, 5e-4 * cup, 0.5 * ball)
@@ -140,11 +142,14 @@ def arbor_through(
             return None
         keys |= {"diameter_mm": cup, "thickness_mm": 1e3 * THINNEST_FLANGE}
         keys["grip_mm"] = round(1e3 * depth, 2)
-        return keys, f"{text}; cups, which close on the part round hub and holes, mask these"
+        cups = f"cups of {cup:g} mm on it, which close on the part round hub and holes, mask these"
+        return keys, f"{text}; {cups}"
     flange = math.floor(2e3 * 2.0 * min(FLANGE * bore.radius, away - ball)) / 2.0
     if 1e-3 * flange > 2.0 * LEAST_FLANGE * bore.radius:
         thick = max(THINNEST_FLANGE, 2.0 * THICK * bore.radius)
         keys |= {"diameter_mm": flange, "thickness_mm": math.ceil(2e3 * thick - 1e-6) / 2.0}
+    if "diameter_mm" in keys:
+        text += f"; flanges of {keys['diameter_mm']:g} mm on it lie against the part"
     return keys, text
 
 

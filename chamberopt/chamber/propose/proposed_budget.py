@@ -38,6 +38,7 @@ SET_TIMES = (
 # Factors on the pilot's time, which is short. Where it resolves no single places, the least covered
 # ones lag behind the target on average: 326 s against 133 s in a joint's chamber.
 MORE, LAGGING = 1.3, 2.0
+ROUGH = 0.4  # half-width of a time over the time, from which on that is a matter to settle
 LONG = 1800.0  # s
 UNEVEN = 1.5  # time of single places over that of the target on average, from which on they rule
 
@@ -111,7 +112,10 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
     """Return the budget with which single places of the target are probably resolved."""
     coverage_percent, strength_dents, in_search = asked or Asked()
     times = (coverage_percent or 100.0) / 100.0
-    treatment = settable(times * (MORE if found.places else LAGGING) * found.time_to_98)
+    longer = LAGGING * found.time_to_98
+    if found.places:  # and what the pilot is not sure of
+        longer = max(MORE * found.time_to_98, found.time_to_98 + found.spread)
+    treatment = settable(times * longer)
     needed = max(MARGIN * DENTS, found.dents_for_mean * treatment, strength_dents)
     enough = needed / (REPLICAS * found.dent_rate * USUAL_GAUGE)
     most = COLLISIONS / (REPLICAS * found.collision_rate)
@@ -204,7 +208,13 @@ def _said_of_treatment(found: Measured, treatment: float, coverage_percent: floa
     if not found.places:
         what = "the target is 98 % covered ON AVERAGE (places are out of reach or not resolved)"
     friction = " at the slow end of friction" if found.friction else ""
-    more = f", and {MORE - 1.0:.0%} more" if found.places else f", times {LAGGING:g}"
+    more = f", times {LAGGING:g}"
+    if found.places:
+        is_rough = found.spread > (MORE - 1.0) * found.time_to_98
+        more = f", and {'its ±' if is_rough else f'{MORE - 1.0:.0%}'} more"
+        if found.spread > ROUGH * found.time_to_98:
+            long_run = "simulate it before the time is set"
+            more += f"; TIME KNOWN ROUGHLY, by {found.spread / found.time_to_98:.0%}: {long_run}"
     long = f"; LONG: {_said_of_long(found)}" if found.time_to_98 > LONG else ""
     wanted = ""
     if coverage_percent is not None:

@@ -41,8 +41,8 @@ WHOLE = 1.25  # a face up to so much larger than the wanted floor becomes the wh
 def of_blocks(ball: float) -> str:
     """Return what is said of a floor of several sonotrodes, for a diameter of the balls [m]."""
     return (
-        "LARGER THAN ONE SONOTRODE: several side by side, driven alike; gaps between them below "
-        f"{plain(1e3 * WIDEST_GAP * ball, 3)} mm, half a ball"
+        "LARGER THAN ONE SONOTRODE: several side by side, which vibrate in phase and alike; gaps "
+        f"between them below {plain(1e3 * WIDEST_GAP * ball, 3)} mm, half a ball"
     )
 
 

@@ -248,7 +248,7 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
     if predicted is not None:
         expected = f"expected {_with_strip(predicted)}"
     usual = usual_intensity(metal, middle)
-    beside = why_none(metal, middle)
+    beside = f"NO USUAL INTENSITY: {why_none(metal, middle)}"
     if usual is not None:
         beside = f"{usual.low:g}-{usual.high:g}A are {usual.text}; to aim at it: --intensity usual"
     return replace(made, reasons={**made.reasons, INTENSITY: f"{expected}; {beside}"})

@@ -24,7 +24,13 @@ from chamberopt.chamber.propose.proposal import (
     sonotrode_area,
     touched_share,
 )
-from chamberopt.chamber.propose.proposed_balls import AS_GOOD, MANY, MISSED_FILLETS, fit_sizes
+from chamberopt.chamber.propose.proposed_balls import (
+    AS_GOOD,
+    MANY,
+    MISSED_FILLETS,
+    MOSTLY,
+    fit_sizes,
+)
 from chamberopt.chamber.propose.proposed_budget import (
     COVERED,
     UNEVEN,
@@ -42,7 +48,10 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain, rounded
 
 RAISED = 1.0, 2.0, 3.0  # ball diameters by which a ceiling is raised for a second pose
-LEAST_SERVED = 0.25  # share of the target that coarse balls serve before finer ones, by heart
+# When two sizes pay, by heart: coarse balls serve MOSTLY of the target, their intensity is so many
+# times that of the finer ones, and these serve so much more of the target, or take less than half
+# of the time. Finer balls for fillets, where parts fail, pay in any case.
+STRONGER, MUCH = 1.5, 0.15
 # Warnings of fillets, slots and gaps that are too narrow, and of what no ball touches.
 NOT_SERVED = re.compile(r"^shot of |^[\d.]+% of |no ball gets in there")
 Steps = list[dict[str, Any]]
@@ -77,7 +86,7 @@ def propose_second_pose(
             if "jam in" in _new_harm(two, made):
                 two = min(two, _turned_over(made, balls), key=faults)
     except InputError:
-        return dropped("what holds it here does not hold it there")
+        return dropped("what holds it in this pose does not hold it turned over")
     in_air = any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air
     if in_air or (harm := _new_harm(two, made)):
         return dropped("nothing would hold it" if in_air else harm)
@@ -86,7 +95,7 @@ def propose_second_pose(
         return dropped("no pilot resolved it")
     enough = after.time_to_98 <= QUICKER * found.time_to_98 or is_hidden
     if not enough or (is_hidden and touched_share(two) < COVERED):
-        return dropped(f"by a pilot {after.in_words} then too")
+        return dropped(f"by a pilot {after.in_words} then, in one pose {found.in_words}")
     before = f"{touched_share(made):.0%} of the target is in reach" if is_hidden else found.in_words
     reason = f"turned over after half of the time: by pilots {after.in_words}, in one pose {before}"
     return replace(two, reasons={**two.reasons, ".steps": reason}), after
@@ -146,8 +155,9 @@ def with_finer_balls(
         finer = _with_shot(coarse, finer_mm)
         fine, most = fit_sizes(finer.chamber.part, [1e-3 * finer_mm, 1e-3 * coarse_mm])
         shares = f"{coarse_mm:g} mm serve {most.served:.0%}, {finer_mm:g} mm {fine.served:.0%}"
-        more = fine.served > most.served + AS_GOOD or fine.fillets > most.fillets + MISSED_FILLETS
-        if not more or most.served < LEAST_SERVED:
+        for_fillets = fine.fillets > most.fillets + MISSED_FILLETS
+        gain = fine.served - most.served
+        if not (gain > AS_GOOD or for_fillets) or most.served < MOSTLY:
             return None, shares
         for balls in RAISED:  # a ceiling that suits the coarse balls may hold the finer ones
             if "gap" in (harm := _new_harm(finer, coarse)):
@@ -158,17 +168,24 @@ def with_finer_balls(
         found, after = found or measure(coarse), measure(finer)
         if found is None or found.intensity is None or after is None:
             return None, "no pilot resolved both sizes"
+        weak = after.intensity
+        if weak is not None and found.intensity.value < STRONGER * weak.value:
+            return None, f"{plain(weak.value, 2)} mmA of {finer_mm:g} mm are hardly less"
         budgets = [measured_budget(coarse, found), measured_budget(finer, after)]
+        if not for_fillets and gain < MUCH and budgets[1].treatment > budgets[0].treatment:
+            longer = f"{rounded(budgets[1].treatment, 3)} s more for {gain:.0%} of the target"
+            return None, f"{longer} do not pay: {shares}"
         two = _one_after_the_other(coarse, finer, budgets)
     except InputError as error:
         return None, str(error)
     first, second = (f"{rounded(one.treatment, 3)} s" for one in budgets)
+    turned = ", half of each time turned over" if len(_steps(coarse)) > 1 else ""
     weaker = f", about {plain(after.intensity.value, 2)} mmA," if after.intensity else ""
     count, mass_g = finer.design.shot.count, finer.tables["shot"]["mass_g"]
     reason = (
-        f"{coarse_mm:g} mm balls for {first}, then {finer_mm:g} mm for {second}: the first for "
-        f"the intensity, about {plain(found.intensity.value, 2)} mmA on the {most.served:.0%} of "
-        f"the target that they serve; the second, {count:,} balls ({mass_g:g} g){weaker} for "
+        f"{coarse_mm:g} mm balls for {first}, then {finer_mm:g} mm for {second}{turned}: the first "
+        f"for the intensity, about {plain(found.intensity.value, 2)} mmA on the {most.served:.0%} "
+        f"of the target that they serve; the second, {count:,} balls ({mass_g:g} g){weaker} for "
         f"narrow places: they serve {fine.served:.0%}; each until it has covered by itself what it "
         "touches; TWO INTENSITIES: narrow places get that of the finer balls alone: agree on it, "
         f"or take one size (--ball-mm {finer_mm:g} or {coarse_mm:g})"

@@ -95,6 +95,25 @@ def test_one_size_stays_where_finer_ones_bring_nothing(
     assert told.startswith(why)
 
 
+@pytest.mark.parametrize(
+    ("finer", "much", "why"),
+    [
+        (pilot(300.0, 0.21), 0.15, "0.21 mmA of 1 mm are hardly less"),
+        (pilot(900.0, 0.1), 0.9, "1200 s more for "),
+        (pilot(900.0, 0.1), 0.0, ""),
+        (pilot(300.0, 0.1), 0.9, ""),
+    ],
+)
+def test_two_sizes_are_proposed_where_they_pay(
+    coarse: Proposal, finer: Measured, much: float, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not for an intensity that hardly differs, nor for hours that bring little."""
+    monkeypatch.setattr(proposed_steps, "MUCH", much)
+    two, told = with_finer_balls(coarse, pilot(600.0, 0.3), FINER, lambda _: finer)
+    assert (two is None) == bool(why)
+    assert told.startswith(why)
+
+
 def test_what_stands_against_finer_balls_is_told(
     coarse: Proposal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -120,7 +139,11 @@ def test_what_stands_against_finer_balls_is_told(
         "warnings",
         lambda one, _: [told] * (one.chamber.height_mm < low + 2.0 and one.shot.diameter < 2e-3),
     )
-    two, why = with_finer_balls(coarse, found, FINER, lambda _: pilot(300.0, 0.1))
+
+    def measure(one: Proposal) -> Measured:
+        return pilot(300.0, 0.3 if one.design.shot.diameter > 2e-3 else 0.1)
+
+    two, why = with_finer_balls(coarse, found, FINER, measure)
     assert two is not None, why  # raised by one ball, then by two
     assert two.design.chamber.height_mm == low + 3.0 * FINER
     assert "high enough for both sizes" in two.reasons["chamber.height_mm"]
