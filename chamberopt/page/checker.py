@@ -19,6 +19,8 @@ from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.page.answers import check_answers
 from sim_core import SceneError
 
+# Of a check: enough that the page comes first, and so little that a simulation does not starve it.
+NICE = 3
 ENDED = "the check's process ended (killed from outside, or out of memory)"
 
 
@@ -117,7 +119,7 @@ def _started() -> Child:
 def _yield_to_the_page() -> Iterator[bytes]:
     """Let the page's own answers come first. Yields no answer."""
     if hasattr(os, "nice"):
-        os.nice(10)
+        os.nice(NICE)
     yield from ()
 
 
