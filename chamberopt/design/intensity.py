@@ -232,9 +232,8 @@ class Comparison:
         if standing == NOT_DECIDED:
             shown = float(f"{predicted.value:.2g}")  # as it is told
             where = INSIDE if wanted[0] <= shown <= wanted[1] else OUTSIDE
-            words = f"{NOT_DECIDED}: expected {where}, but the interval is wider than the range"
-            if where == OUTSIDE:
-                words = f"{NOT_DECIDED}: expected {where}, with an end of the interval inside"
+            other = OUTSIDE if where == INSIDE else INSIDE
+            words = f"{NOT_DECIDED}: expected {where}, but its interval reaches {other}"
         return cls(standing, words, predicted.in_words)
 
 
