@@ -212,10 +212,10 @@ def _said_of_treatment(found: Measured, treatment: float, coverage_percent: floa
     if found.places:
         is_rough = found.spread > (MORE - 1.0) * found.time_to_98
         more = f", and {'its ±' if is_rough else f'{MORE - 1.0:.0%}'} more"
-        if found.spread > ROUGH * found.time_to_98:
-            long_run = "simulate it before the time is set"
-            more += f"; TIME KNOWN ROUGHLY, by {found.spread / found.time_to_98:.0%}: {long_run}"
     long = f"; LONG: {_said_of_long(found)}" if found.time_to_98 > LONG else ""
+    if found.places and found.spread > ROUGH * found.time_to_98:
+        known = f"to ± {found.spread / found.time_to_98:.0%}"
+        long += f"; TIME KNOWN ROUGHLY, {known}: simulate before it is set"
     wanted = ""
     if coverage_percent is not None:
         times = rounded(coverage_percent / 100.0, 3)

@@ -92,3 +92,14 @@ def test_what_makes_a_time_long_is_said() -> None:
 )
 def test_times_are_those_that_a_machine_is_set_to(seconds: float, set_to: float) -> None:
     assert settable(seconds) == set_to
+
+
+def test_a_time_leaves_room_for_what_its_pilot_is_not_sure_of() -> None:
+    """At least 30 % more; from ± 40 % on it is a matter to settle."""
+    for spread, treatment, is_rough in ((50.0, 300.0, False), (150.0, 360.0, True)):
+        budget = propose_budget(
+            Measured(1e6, 1e4, 200.0, True, spread, True, 0.0, 1e-3, 8.0, 200.0)
+        )
+        assert budget.treatment == treatment
+        reason = budget.reasons["process.treatment_time_s"]
+        assert ("; TIME KNOWN ROUGHLY, to ± 75%: simulate" in reason) == is_rough
