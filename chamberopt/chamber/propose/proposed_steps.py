@@ -172,7 +172,7 @@ def with_finer_balls(
         if weak is not None and found.intensity.value < STRONGER * weak.value:
             return None, f"{plain(weak.value, 2)} mmA of {finer_mm:g} mm are hardly less"
         budgets = [measured_budget(coarse, found), measured_budget(finer, after)]
-        if not for_fillets and gain < MUCH and budgets[1].treatment > budgets[0].treatment:
+        if not for_fillets and gain < MUCH and budgets[1].treatment >= budgets[0].treatment:
             longer = f"{rounded(budgets[1].treatment, 3)} s more for {gain:.0%} of the target"
             return None, f"{longer} do not pay: {shares}"
         two = _one_after_the_other(coarse, finer, budgets)
