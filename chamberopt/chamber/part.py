@@ -27,6 +27,7 @@ from chamberopt.geometry.solids import snap_to_grid
 from chamberopt.geometry.triangles import (
     area_vectors,
     areas,
+    facet_normals,
     interpolate,
     rotation_matrix,
     unit_normals,
@@ -164,7 +165,7 @@ class Part:
         """Unit normals of the surface at the corners of the triangles, (m, 3, 3)."""
         if self.normals is not None:
             return self.normals
-        return np.repeat(unit_normals(self.vertices[self.triangles])[:, None], 3, axis=1)
+        return facet_normals(self.vertices[self.triangles])
 
     @property
     def corners_with_normals(self) -> np.ndarray:
@@ -189,7 +190,7 @@ class Part:
             source: part triangle under each triangle of the cavity, else -1, shape (k,).
         """
         corners = vertices[triangles]
-        normals = np.repeat(-unit_normals(corners)[:, None], 3, axis=1)
+        normals = -facet_normals(corners)
         own = np.flatnonzero(source >= 0)
         at = self.normals_at(np.repeat(source[own], 3), corners[own].reshape(-1, 3))
         normals[own] = at.reshape(-1, 3, 3)
@@ -233,22 +234,19 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
     surface = table.target.model_copy(update={"reachable": False})
     found = _simulated(given, surface, table.smoothing, design.zones, _is_wall(design))
     mesh, origin = found.mesh, found.origin
-    target = _of_target(given, table.target)[origin]
-    if table.target.cut and table.target.box_mm is not None:
-        target = target & _in_box(mesh, table.target.box_mm)
     turn, shift = _pose(given, mesh.vertices, design)
     vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
     thickness: np.ndarray | None = None
     thin_notes: list[str] = []
     if not _is_wall(design):
-        chosen = {"the target": target}
+        chosen = {"the target": found.target}
         chosen |= {f"zone {name}": zone[origin] for name, zone in zones.items()}
         thickness, thin_notes = thickness_to_simulate(design, mesh, chosen)
     part = Part(
         vertices=vertices,
         triangles=mesh.triangles,
         area=areas(vertices, mesh.triangles),
-        target=target,
+        target=found.target,
         name=table.mesh_path.name,
         sha256=mesh.sha256,
         unit=mesh.unit,
@@ -422,7 +420,8 @@ def _of_target(mesh: PartMesh, target: Target) -> np.ndarray:
 class _Simulated(NamedTuple):
     """The mesh of the part as it is simulated, in the file's frame.
 
-    `origin` is the file's triangle from which each triangle comes. `normals` are unit normals, at
+    `origin` is the file's triangle from which each triangle comes, and `target` marks those of the
+    target, (k,), whatever of it the shot reaches. `normals` are unit normals, at
     the corners of the triangles, of the smooth surface behind them, and `hollow` is the largest
     hollow curvature of this surface on each triangle [1/m]. `facts` says what was smoothed. The
     last three are None where nothing was smoothed.
@@ -430,6 +429,7 @@ class _Simulated(NamedTuple):
 
     mesh: PartMesh
     origin: np.ndarray
+    target: np.ndarray
     normals: np.ndarray | None
     hollow: np.ndarray | None
     facts: SmoothingFacts | None
@@ -454,56 +454,49 @@ def _simulated(
         (zone.smoothing or smoothing).rule(_chosen(mesh, zone.target, f"zones.{k}.target"))
         for k, zone in enumerate(zones)
     ]
-    found = _Simulated(mesh, np.arange(len(mesh.triangles)), None, None, None)
+    found = _Simulated(mesh, np.arange(len(mesh.triangles)), chosen, None, None, None)
     if not is_wall:
         made = smooth(mesh, smoothing.rule(chosen), rules)
-        found = _Simulated(made.of_part(mesh), made.origin, made.normals, made.hollow, made.facts)
-    own = chosen[found.origin]
+        origin = made.origin
+        of_surface = made.normals, made.hollow, made.facts
+        found = _Simulated(made.of_part(mesh), origin, chosen[origin], *of_surface)
     if target.cut and target.box_mm is not None:
         if is_wall:
             text = "the part is drawn with its chamber, and its triangles are not divided"
             raise InputError(f"part.target.cut: {text}; leave it out")
-        found = _cut(found, target.box_mm, own)
-        own = chosen[found.origin] & _in_box(found.mesh, target.box_mm)
+        found = _cut(found, target.box_mm)
     size = target.element
-    return found if size is None else _remeshed(found, own, size)
+    return found if size is None else _remeshed(found, size)
 
 
-def _cut(found: _Simulated, box_mm: Box, target: np.ndarray) -> _Simulated:
-    """Return the part with the triangles of its target (m,) divided at the sides of a box."""
-    mesh, count = found.mesh, len(found.mesh.triangles)
-    normals = found.normals
+def _cut(found: _Simulated, box_mm: Box) -> _Simulated:
+    """Return the part with the triangles of its target divided at a box, which narrows it."""
+    mesh, normals, count = found.mesh, found.normals, len(found.mesh.triangles)
     if normals is None:
-        normals = np.repeat(unit_normals(mesh.vertices[mesh.triangles])[:, None], 3, axis=1)
+        normals = facet_normals(mesh.vertices[mesh.triangles])
     own, of_crease = np.arange(count), np.zeros((count, 3), dtype=bool)
     surface = Surface(mesh.vertices, mesh.triangles, own, normals, of_crease, np.zeros(count))
-    made = cut_at_box(surface, 1e-3 * np.asarray(box_mm), target)
+    made = cut_at_box(surface, 1e-3 * np.asarray(box_mm), found.target)
     rows = made.parent
+    mesh = mesh.divided(made.vertices, made.triangles, rows)
     return found._replace(
-        mesh=replace(
-            mesh,
-            vertices=made.vertices,
-            triangles=made.triangles.astype(np.int32),
-            numbering=mesh.numbering.select(rows),
-            groups={name: mask[rows] for name, mask in mesh.groups.items()},
-            normals=None,
-        ),
+        mesh=mesh,
         origin=found.origin[rows],
+        target=found.target[rows] & _in_box(mesh, box_mm),
         normals=None if found.normals is None else made.normals,
         hollow=None if found.hollow is None else found.hollow[rows],
     )
 
 
-def _remeshed(found: _Simulated, target: np.ndarray, size: float) -> _Simulated:
+def _remeshed(found: _Simulated, size: float) -> _Simulated:
     """Return the part with its target in new triangles whose sides are about `size` [m].
 
     Raises InputError if the triangles would be too many.
 
     Args:
         found: the part, perhaps with smoothed rounds.
-        target: marks the triangles of the target, (m,).
     """
-    mesh = found.mesh
+    mesh, target = found.mesh, found.target
     area = float(areas(mesh.vertices, mesh.triangles)[target].sum())
     count = area / (np.sqrt(3.0) / 4.0 * size * size)
     if count > MAX_ELEMENTS:
@@ -526,14 +519,7 @@ def _remeshed(found: _Simulated, target: np.ndarray, size: float) -> _Simulated:
         f"{1e3 * longest.max():.3g} mm at most, shape {shape.min():.2f} at worst (1: equilateral)"
     )
     origin = _find_origin(mesh, vertices[triangles], source)
-    meshed = replace(
-        mesh,
-        vertices=vertices,
-        triangles=triangles.astype(np.int32),
-        numbering=mesh.numbering.select(origin),
-        groups={name: mask[origin] for name, mask in mesh.groups.items()},
-        notes=(*mesh.notes, note),
-    )
+    meshed = replace(mesh.divided(vertices, triangles, origin), notes=(*mesh.notes, note))
     normals = found.normals
     if normals is not None:
         corners = np.repeat(mesh.vertices[mesh.triangles[origin]], 3, axis=0)
@@ -541,7 +527,8 @@ def _remeshed(found: _Simulated, target: np.ndarray, size: float) -> _Simulated:
         places = vertices[triangles].reshape(-1, 3)
         normals = unit_vectors(interpolate(of_corners, corners, places)).reshape(-1, 3, 3)
     hollow = None if found.hollow is None else found.hollow[origin]
-    return found._replace(mesh=meshed, origin=found.origin[origin], normals=normals, hollow=hollow)
+    own = found.origin[origin], target[origin], normals, hollow
+    return _Simulated(meshed, *own, found.facts)
 
 
 def _find_origin(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.ndarray:

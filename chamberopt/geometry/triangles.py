@@ -235,6 +235,11 @@ def unit_normals(corners: np.ndarray) -> np.ndarray:
     return unit_vectors(np.cross(corners[..., 1, :] - first, corners[..., 2, :] - first))
 
 
+def facet_normals(corners: np.ndarray) -> np.ndarray:
+    """Return the unit normals of triangles (m, 3, 3) at each of their corners, (m, 3, 3)."""
+    return np.repeat(unit_normals(corners)[:, None], 3, axis=1)
+
+
 def unit_vectors(vectors: np.ndarray) -> np.ndarray:
     """Return vectors (..., 3) scaled to length 1. A zero vector stays zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)

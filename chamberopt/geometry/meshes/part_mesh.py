@@ -16,7 +16,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +31,7 @@ from chamberopt.geometry.meshes.self_intersection import refuse_self_intersectio
 from chamberopt.geometry.meshes.step_tessellation import Tessellation
 from chamberopt.geometry.meshes.surface_error import SurfaceError
 from chamberopt.geometry.meshes.units import METRES_PER, find_unit
-from chamberopt.geometry.triangles import unit_normals
+from chamberopt.geometry.triangles import facet_normals
 
 MOST_KEPT = 8  # parts that read_part_cached keeps
 MEANT = 0.5  # cosine between a facet and a stated normal, below which the normal is wrong
@@ -62,6 +62,22 @@ class PartMesh:
     def size(self) -> np.ndarray:
         """Sides (3,) of the part's bounding box [m]."""
         return np.asarray(np.ptp(self.vertices, axis=0))
+
+    def divided(self, vertices: np.ndarray, triangles: np.ndarray, origin: np.ndarray) -> PartMesh:
+        """Return the part in other triangles, with the numbers and groups of its own.
+
+        Args:
+            vertices, triangles: the other triangles, (k, 3), and their vertices [m].
+            origin: the triangle of this mesh under each of them, (k,).
+        """
+        return replace(
+            self,
+            vertices=vertices,
+            triangles=triangles.astype(np.int32),
+            numbering=self.numbering.select(origin),
+            groups={name: mask[origin] for name, mask in self.groups.items()},
+            normals=None,
+        )
 
 
 @dataclass(frozen=True)
@@ -232,7 +248,7 @@ def _normals_at(soup: TriangleSoup, corners: np.ndarray, given: np.ndarray) -> n
     """
     if soup.normals is None:
         return None
-    own = np.repeat(unit_normals(corners)[:, None], 3, axis=1)
+    own = facet_normals(corners)
     normals = own.copy()
     for k in range(3):  # triangles may have been turned over, but their corners stay in place
         for corner in range(3):

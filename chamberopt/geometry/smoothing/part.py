@@ -149,14 +149,7 @@ class SmoothPart:
         # The number of triangles is no test: a simplified mesh may have as many after its division.
         if np.array_equal(self.triangles, mesh.triangles):
             return mesh
-        return replace(
-            mesh,
-            vertices=self.vertices,
-            triangles=self.triangles,
-            numbering=mesh.numbering.select(self.origin),
-            groups={name: mask[self.origin] for name, mask in mesh.groups.items()},
-            normals=None,
-        )
+        return mesh.divided(self.vertices, self.triangles, self.origin)
 
 
 class Rule(NamedTuple):
