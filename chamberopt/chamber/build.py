@@ -89,6 +89,7 @@ class Chamber:
     fitting: np.ndarray | None = None
     shape_sha256: str = ""  # of the Python file that a user's own shape was run from
     fixtures: dict[str, Fixture] = field(default_factory=dict)  # "holder" and "mask", if any
+    holder_tag: int | None = None  # in `mesh`, of a holder that turns with the part
     # The chambers of all steps of a design with steps. The chamber then is that of the first step,
     # but for the area that is exposed in any of them.
     steps: tuple[Chamber, ...] = ()
@@ -103,7 +104,10 @@ class Chamber:
         """The surface in the simulator's form, whose search tree is built once."""
         from sim_core import TriangleMesh
 
-        return TriangleMesh(self.vertices, self.triangles, self.tags)
+        tags = self.tags
+        if self.holder_tag is not None:
+            tags = np.where(self.on_fixture("holder"), np.uint8(self.holder_tag), tags)
+        return TriangleMesh(self.vertices, self.triangles, tags)
 
     @property
     def pieces_in_air(self) -> int:
@@ -254,7 +258,7 @@ def _build_one(design: Design, target: np.ndarray | None) -> Chamber:
     volume = float(tetrahedron_volumes(room.vertices, room.triangles).sum())
     surface = room.vertices, room.triangles, traced.tags, traced.source
     origin = tuple(notes), traced.fitting, design.chamber.sha256
-    chamber = Chamber(*surface, volume, part, exposed, *origin, fixtures)
+    chamber = Chamber(*surface, volume, part, exposed, *origin, fixtures, design.turning_holder_tag)
     _refuse_idle_bore(design, chamber)
     return replace(chamber, notes=(*notes, *_holding_notes(chamber)))
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_fields import metres
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, further_sonotrode_tag
+
+T = TypeVar("T")
 
 # A prediction compares a ball with every other ball. It takes about 40 µs for 20,000 balls, and
 # every ball needs about a thousand predictions a simulated second.
@@ -64,9 +66,9 @@ def part_rotation(design: Design, axis: Axis | None, phase: float = 0.0) -> Part
     if axis is None:
         raise ValueError("the axis of a turning part is not given")
     point, direction = ((float(x), float(y), float(z)) for x, y, z in axis)
-    return PartRotation(
-        TAG_PART, point, direction, turn.rpm, turn.amplitude, turn.frequency_hz, phase
-    )
+    motion = turn.rpm, turn.amplitude, turn.frequency_hz, phase
+    tag = design.turning_holder_tag
+    return PartRotation(TAG_PART, point, direction, *motion, () if tag is None else (tag,))
 
 
 def require_turnable(design: Design, mesh: TriangleMesh, axis: Axis | None) -> None:
@@ -109,7 +111,7 @@ def balls_can_rest(design: Design, mesh: TriangleMesh | AnalyticCavity) -> bool:
         return design.effects.rest
     moving = [TAG_SONOTRODE, *(further_sonotrode_tag(k) for k in range(len(design.sonotrodes)))]
     if design.effects.part_turn is not None:
-        moving.append(TAG_PART)
+        moving += [TAG_PART, design.turning_holder_tag or TAG_PART]
     gravity = Gravity() if design.effects.gravity else None
     return design.effects.rest is not False and can_rest(mesh, gravity, *moving)
 
@@ -166,19 +168,19 @@ def scene_physics(
         raise InputError(
             'effects: still "auto"; resolve them first with a pilot run, as simulate and run do'
         )
-    # One law a tag, in the order TAG_PART, TAG_SONOTRODE, TAG_WALL, further sonotrodes.
-    laws = [materials.part, materials.sonotrode, materials.wall]
-    laws += [materials.sonotrode] * len(design.sonotrodes)
+
+    def of_tags(part: T, sonotrode: T, wall: T) -> tuple[T, ...]:
+        """Return one a tag: of part, sonotrode, wall, further sonotrodes, a turning holder."""
+        holders = 0 if design.turning_holder_tag is None else 1
+        return part, sonotrode, wall, *[sonotrode] * len(design.sonotrodes), *[wall] * holders
+
+    laws = of_tags(materials.part, materials.sonotrode, materials.wall)
     surfaces, balls = tuple(law.restitution for law in laws), materials.shot.restitution
     accuracy, friction, roughness = design.process.accuracy, None, None
     if effects.friction is not None:
-        of_part, of_sonotrode, of_wall = effects.friction.surfaces
-        pairs = (of_part, of_sonotrode, of_wall, *[of_sonotrode] * len(design.sonotrodes))
-        friction = sim_core.Friction(pairs, effects.friction.balls)
+        friction = sim_core.Friction(of_tags(*effects.friction.surfaces), effects.friction.balls)
     if effects.roughness is not None:
-        part, sonotrode, wall = effects.roughness.slopes
-        slopes = (part, sonotrode, wall, *[sonotrode] * len(design.sonotrodes))
-        roughness = sim_core.Roughness(slopes, roughness_seed)
+        roughness = sim_core.Roughness(of_tags(*effects.roughness.slopes), roughness_seed)
     return sim_core.Physics(
         gravity=sim_core.Gravity() if effects.gravity else None,
         restitution=sim_core.Restitution(surfaces, balls, accuracy.elastic_below),

@@ -34,6 +34,7 @@ from chamberopt.design.materials import Materials, with_friction, with_numbers
 from chamberopt.design.part import PartTable
 from chamberopt.design.process import MAX_STEPS, Process, Step, step_problems, values_in_step
 from chamberopt.design.ranges import Ranges
+from chamberopt.design.shape_surface import further_sonotrode_tag
 from chamberopt.design.shapes import SHAPES, ChamberTable
 from chamberopt.design.shapes.base import is_custom
 from chamberopt.design.shapes.custom import RecordedShape, load_custom_shape
@@ -155,6 +156,13 @@ class Design(FileTable, ShownInNotebook):
             for one in self.in_steps.values()
         }
         return len(like) == 1
+
+    @property
+    def turning_holder_tag(self) -> int | None:
+        """Tag in the simulator of the holder of a part that turns; None without one."""
+        if self.effects.part_turn is None or self.holder is None or self.holder.kind == "bore":
+            return None
+        return further_sonotrode_tag(len(self.sonotrodes))  # after those of all sonotrodes
 
     def require_one_step(self, what: str) -> None:
         """Raise InputError if the design has steps, for a command that cannot take them.

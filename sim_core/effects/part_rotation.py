@@ -31,7 +31,7 @@ MORE_THAN_ONE = 1.01  # turns
 
 
 class PartRotation(NamedTuple):
-    """Rotation of the surface ``tag`` about an axis: steady (``rpm``) or to and fro.
+    """Rotation of the surface ``tag``, and of what holds it, about an axis: steady or to and fro.
 
     At angle 0 the part is placed as in the mesh. Impacts on the part are logged in its own frame,
     that is, on the part as placed in the mesh.
@@ -45,6 +45,7 @@ class PartRotation(NamedTuple):
             frequency t + phase).
         frequency: frequency of a rotation to and fro [Hz].
         phase: angle, or phase of the sine, at time 0 [rad].
+        with_part: tags of further surfaces that turn with the part, such as its holder.
     """
 
     tag: int
@@ -54,15 +55,25 @@ class PartRotation(NamedTuple):
     amplitude: float | None = None
     frequency: float | None = None
     phase: float = 0.0
+    with_part: tuple[int, ...] = ()
+
+    @property
+    def tags(self) -> tuple[int, ...]:
+        """Tags of all surfaces that turn, the part first."""
+        return (self.tag, *self.with_part)
 
 
 class RotationAxis(NamedTuple):
     """Axis and range of a part's rotation, from which the part's obstacles are built."""
 
-    tag: int  # surface tag of the part
+    tags: tuple[int, ...]  # of the surfaces that turn
     point: tuple[float, float, float]  # a point of the axis [m]
     axis: tuple[float, float, float]  # unit vector
     amplitude: float  # largest angle to each side [rad]; infinite for a steady rotation
+
+    def turns(self, tags: np.ndarray) -> np.ndarray:
+        """Return True for each tag (k,) of a surface that turns."""
+        return np.isin(tags, self.tags)
 
 
 class RotationState(NamedTuple):
@@ -149,7 +160,7 @@ def checked_axis(turn: PartRotation | None) -> RotationAxis | None:
     x, y, z = (float(k) / length for k in turn.axis)
     px, py, pz = (float(k) for k in turn.axis_point)
     amplitude = math.inf if turn.amplitude is None else float(turn.amplitude)
-    return RotationAxis(int(turn.tag), (px, py, pz), (x, y, z), amplitude)
+    return RotationAxis(tuple(map(int, turn.tags)), (px, py, pz), (x, y, z), amplitude)
 
 
 def angle_at(rotation: RotationState, time: float) -> float:

@@ -89,7 +89,7 @@ def _swept_bounds(
     low[periodic], high[periodic] = -UNBOUNDED, UNBOUNDED
     if axis is not None and isinstance(mesh, TriangleMesh):
         point = np.array(axis.point) - mesh.middle
-        own = mesh.corners[mesh.tags == axis.tag] - mesh.middle
+        own = mesh.corners[axis.turns(mesh.tags)] - mesh.middle
         reach = np.linalg.norm(own - point, axis=2).max(initial=0.0)
         low, high = np.minimum(low, point - reach), np.maximum(high, point + reach)
     return np.stack([low - amplitude, high + amplitude])

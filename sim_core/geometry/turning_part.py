@@ -46,7 +46,7 @@ def part_rows(
             chamber in an edge that balls can touch.
     """
     require_free_axis(mesh, axis, radius)
-    sides = (mesh.tags == axis.tag)[table.triangles]
+    sides = axis.turns(mesh.tags)[table.triangles]
     mixed = np.flatnonzero(sides[:, 0] != sides[:, 1])
     if len(mixed):
         one, two = table.triangles[mixed[0]]
@@ -70,7 +70,7 @@ def require_free_axis(mesh: TriangleMesh, axis: RotationAxis, radius: float) -> 
     corner of the chamber through the part. Two edges that cross are not noticed if no
     corner of one body passes through the other body.
     """
-    turning = mesh.tags == axis.tag
+    turning = axis.turns(mesh.tags)
     joint = _joint(mesh, turning)
     _require_round_joint(mesh, joint, axis, radius)
     _require_free_corners(mesh, turning, mesh.vertices[joint[:, 2:]], axis, radius)
@@ -87,7 +87,7 @@ def build_part_tree(
         mesh: mesh of the chamber.
         axis: axis of the part.
     """
-    place = _in_axis_frame(mesh.corners[mesh.tags == axis.tag].reshape(-1, 3), axis)
+    place = _in_axis_frame(mesh.corners[axis.turns(mesh.tags)].reshape(-1, 3), axis)
     height, across = place[:, 2], np.linalg.norm(place[:, :2], axis=1)
     margin = 1.001 * radii[-1]  # the largest radius and the overlap of faces
     # Boxes are padded for float32 rounding at the size of chamber and axis, not of the part,

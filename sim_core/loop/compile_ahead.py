@@ -149,6 +149,7 @@ def _with_a_turning_box(
     """
     turn = physics.part_rotation
     assert turn is not None
+    turn = turn._replace(axis_point=(0.03, 0.03, 0.03), with_part=())
     shaken = [one.tag for one in physics.vibrations]
     still = next(tag for tag in range(4) if tag not in (turn.tag, *shaken))
     for name in ("restitution", "friction", "roughness"):
@@ -158,7 +159,7 @@ def _with_a_turning_box(
             physics = physics._replace(**{name: wider})
     box = len(vertices) + triangles[:, ::-1]
     return (
-        physics._replace(part_rotation=turn._replace(axis_point=(0.03, 0.03, 0.03))),
+        physics._replace(part_rotation=turn),
         np.concatenate([vertices, 0.02 * vertices + 0.02]),
         np.concatenate([triangles, box]),
         np.concatenate([np.where(np.isin(tags, shaken), tags, still), np.full(len(box), turn.tag)]),

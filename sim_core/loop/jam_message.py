@@ -128,5 +128,6 @@ def _surfaces(
         if not any(alike) and len(found) < MAX_NAMED:
             found.append(t)
     tags = [int(scene.mesh.tags[t]) for t in found]
-    held_by_part = physics.part_rotation is not None and physics.part_rotation.tag in tags
+    turn = physics.part_rotation
+    held_by_part = turn is not None and not set(turn.tags).isdisjoint(tags)
     return [surface_name(scene.mesh, physics, t) for t in found], held_by_part

@@ -324,7 +324,7 @@ def turned_corners(
     axis = checked_axis(turn)
     assert axis is not None
     corners = mesh.corners.copy()
-    own = mesh.tags == axis.tag
+    own = axis.turns(mesh.tags)
     point, direction = np.array(axis.point), np.array(axis.axis)
     corners[own] = rotate_points(corners[own], point, direction, angle)
     return corners

@@ -67,7 +67,7 @@ def surface_name(mesh: TriangleMesh, physics: Physics, triangle: int) -> str:
     turn, tag = physics.part_rotation, int(mesh.tags[triangle])
     if tag in [one.tag for one in physics.vibrations]:
         return f"{vibrating_name(physics, tag)} (triangle {triangle})"
-    if turn is not None and tag == turn.tag:
+    if turn is not None and tag in turn.tags:
         return f"the turning part (triangle {triangle})"
     return f"triangle {triangle}"
 
@@ -100,7 +100,7 @@ def _tightest(
     near, gap = near[touched], distance[touched] - radius
     away = away[touched] / distance[touched, None]
     least, moves = gap.copy(), np.full(len(near), -1)  # number of the vibration, if any
-    turns = np.zeros(len(near), np.bool_) if turn is None else tags[near] == turn.tag
+    turns = np.isin(tags[near], () if turn is None else turn.tags)
     for k, vibration in enumerate(physics.vibrations):
         vibrating = tags[near] == vibration.tag
         towards = away[vibrating] @ vibration.peak

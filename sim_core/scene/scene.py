@@ -173,13 +173,14 @@ class Scene:
         axis = checked_axis(turn)
         tags = np.unique(self.mesh.tags).tolist()
         if turn is not None and axis is not None and isinstance(self.mesh, TriangleMesh):
-            if turn.tag not in tags:
-                raise SceneError(f"part_rotation.tag is {turn.tag}, but the mesh has tags {tags}")
-            if turn.tag in [one.tag for one in vibrations]:
-                raise SceneError(
-                    f"part_rotation.tag and vibration.tag are both {turn.tag}: "
-                    "one surface cannot do both"
-                )
+            for name, tag in [("tag", turn.tag), *(("with_part", one) for one in turn.with_part)]:
+                if tag not in tags:
+                    raise SceneError(f"part_rotation.{name}: {tag}, but the mesh has tags {tags}")
+                if tag in [one.tag for one in vibrations]:
+                    raise SceneError(
+                        f"part_rotation.{name} and vibration.tag are both {tag}: "
+                        "one surface cannot do both"
+                    )
             require_free_axis(self.mesh, axis, 0.5 * float(self.balls.sizes[0]))
         for one in vibrations:
             if one.tag not in tags:

@@ -191,7 +191,7 @@ def overlap(chamber: Chamber) -> float:
     gap = clearance_at(chamber, balls.positions, np.zeros(len(balls)))
     corners = corners_now(mesh, physics)
     if corners is not None and physics.part_rotation is not None:
-        part = np.ascontiguousarray(corners[mesh.tags == physics.part_rotation.tag])
+        part = np.ascontiguousarray(corners[np.isin(mesh.tags, physics.part_rotation.tags)])
         gap = np.minimum(gap, clearance(part, balls.positions, REACH * balls.radius))
     near = gap < REACH * balls.radius  # others touch nothing: how far they are is not measured
     surface = float((0.5 * balls.diameters - gap)[near].max(initial=-math.inf))
@@ -205,7 +205,7 @@ def _in_the_room(mesh: TriangleMesh, physics: Physics) -> np.ndarray:
     return (
         np.ones(len(mesh.tags), dtype=np.bool_)
         if physics.part_rotation is None
-        else mesh.tags != physics.part_rotation.tag
+        else ~np.isin(mesh.tags, physics.part_rotation.tags)
     )
 
 

@@ -13,7 +13,7 @@ from chamberopt.chamber.checks.check import first_warnings, surface_names, warni
 from chamberopt.chamber.checks.gaps import find_ledges
 from chamberopt.chamber.fixture import size_in_words
 from chamberopt.chamber.part import turning_axis
-from chamberopt.chamber.scene import chamber_mesh, require_turnable
+from chamberopt.chamber.scene import build_scene, chamber_mesh, part_rotation, require_turnable
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design, validate
 from chamberopt.design.fixture import TIGHT_GAP, WIDEST_GAP
@@ -403,7 +403,16 @@ def test_an_arbor_turns_with_the_part_about_its_own_axis(parts: Path) -> None:
                 build_chamber(given)
             continue
         chamber = build_chamber(given)
-        require_turnable(given, chamber_mesh(chamber), turning_axis(given, chamber.part))
+        mesh, axis = chamber_mesh(chamber), turning_axis(given, chamber.part)
+        require_turnable(given, mesh, axis)
+        turn = part_rotation(given, axis)
+        assert turn is not None
+        (tag,) = turn.with_part
+        assert (mesh.tags == tag).tolist() == chamber.on_fixture("holder").tolist()
+        assert (chamber.tags[mesh.tags == tag] == TAG_WALL).all()  # it is of the wall's metal
+        laws = build_scene(given, mesh, 1, axis).physics.restitution
+        assert laws is not None
+        assert laws.surfaces[tag] == laws.surfaces[TAG_WALL]
 
 
 @pytest.mark.parametrize(
