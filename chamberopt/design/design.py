@@ -48,6 +48,7 @@ from chamberopt.design.zones import MAX_ZONES, Zone, zone_problems
 
 # Each further sonotrode has a tag below 255 and needs a cut through all walls before it.
 MAX_SONOTRODES = 50
+MAX_TO_SETTLE = 50
 SHAPE = "chamber.shape"
 NOT_VARIED = (
     "calibration.", "zones.", "ranges.", "part.tessellation.", "holder.at.", "mask.at.", "stress.",
@@ -58,6 +59,11 @@ NOT_VARIED = (
 class Design(FileTable, ShownInNotebook):
     """One complete design: part, chamber, sonotrode, shot, materials, effects, process."""
 
+    to_settle: Annotated[Several[str], Field(max_length=MAX_TO_SETTLE)] = list_field(
+        f"a list of at most {MAX_TO_SETTLE} texts",
+        "what is to be settled before the chamber is built; warned of until it is taken out",
+        (),
+    )
     part: PartTable
     chamber: ChamberTable
     sonotrode: Sonotrode

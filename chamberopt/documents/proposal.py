@@ -1,8 +1,8 @@
 """A proposal of `new` in words: what is proposed and why, and what is to be settled first.
 
 The reasons of a proposal's values say what has to be settled in clauses that begin with words in
-capitals, such as NOT MASKED or LONG. They are one list here, and stand in the design file beside
-the values with all other reasons.
+capitals, such as NOT MASKED or LONG. They are one list, here and in the design file's `to_settle`;
+all other clauses stand beside the values.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.proposed_target import area_in_mm2
+from chamberopt.chamber.propose.text import TO_SETTLE, clauses, to_settle
 from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import in_words
 from chamberopt.common.number_text import plain
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
 
 WIDTH, INDENT = 79, 13  # columns
 MOST_LISTED = 6  # surfaces, without --verbose
-TO_SETTLE = re.compile(r"[A-Z][A-Z-]+(?: [A-Z-]{2,})*\b")  # at the beginning of a clause
-STANDARD = "SAE "  # begins the name of one
 SIMULATED = "simulated"  # the row that is told with --verbose alone
 KINDS = {"bore": "the part itself, out through a wall"}  # of holders, in words
 MINUTE, HOUR = 60.0, 3600.0  # s
@@ -97,27 +96,21 @@ def proposal_in_words(made: Proposal, left_out: Sequence[LeftOut]) -> ProposalIn
     Args:
         left_out: what may be left out of the target, or is peened beside it.
     """
-    rows, settle = [], []
+    rows = []
     for name, value, keys in _rows(made):
         reasons: list[str] = []
         for key in keys:
             reason = one_line(made.reasons.get(key, ""))  # its beginning may be the row's value
-            why, first = clauses(re.sub(f"^{re.escape(value)}[:;] ", "", reason))
-            settle += first
+            why, _ = clauses(re.sub(f"^{re.escape(value)}[:;] ", "", reason))
             if why and why != [value]:
                 of = f"{in_words(key.rpartition('.')[2])}: " if key.endswith("_mm") else ""
                 reasons.append(f"{of}{'; '.join(why)}")
         rows.append(Row(name, value, tuple(reasons)))
-    for one in left_out:
-        keys_of = " and ".join(f"part.target.{key}" for key in one.keys)
-        many = "" if len(one.keys) > 1 else "s"
-        leave = f": {keys_of} in the design leave{many} it out" if keys_of else ""
-        settle.append(f"{one.text}{leave}")
     target = _target(made)
     return ProposalInWords(
         _sentence(made),
         tuple(rows),
-        tuple(_matter(text) for text in settle),
+        tuple(_matter(text) for text in to_settle(made, left_out)),
         tuple(_choice(one, one.name == target) for one in made.known),
     )
 
@@ -168,17 +161,6 @@ def choice_lines(choices: Sequence[Choice], most: int) -> list[str]:
         lines += wrapped(f"  {one.name}: {one.text}{place}{alone}", 4)
     more = [f"  and {len(choices) - most} more: --target pick"] if len(choices) > most else []
     return ["Surfaces to choose from (--target):", *lines, *more]
-
-
-def clauses(reason: str) -> tuple[list[str], list[str]]:
-    """Return the clauses of a reason: why a value is so, and what is to be settled about it."""
-    why: list[str] = []
-    settle: list[str] = []
-    for clause in filter(None, reason.split("; ")):
-        found = TO_SETTLE.match(clause)
-        marks = found is not None and len(found[0]) > 3 and not found[0].startswith(STANDARD)
-        (settle if marks else why).append(clause)
-    return why, settle
 
 
 def time_in_words(seconds: float) -> str:

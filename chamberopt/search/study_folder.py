@@ -184,7 +184,7 @@ class StudyInputs:
         did not know when the study began.
         """
         before, now = self.study["design"], _with_digests(design.model_dump(mode="json"))
-        left_out = ("ranges", "process.accuracy", *self.vary)
+        left_out = ("ranges", "process.accuracy", "to_settle", *self.vary)
         return [
             name
             for name in sorted(_flatten(before).keys() & set(_changed_names(before, now)))

@@ -22,6 +22,7 @@ from chamberopt.chamber.dimensionless import free_path
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.reach import Reach, find_reach, reached_part_share
 from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.common.errors import one_line
 from chamberopt.common.number_text import plain
 from chamberopt.design.almen_strip import USUAL_K_LOG_SD
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE
@@ -182,7 +183,8 @@ def first_warnings(
             f"shot.mass_g = {shot.mass_g:g} is rounded to {shot.count} whole ball(s) of "
             f"{shot.ball_mass * 1e6:.3g} mg: the charge differs by more than 5 %"
         )
-    return texts + calibration_warnings(design)
+    texts += calibration_warnings(design)
+    return texts + [f"to be settled: {one_line(text)}" for text in design.to_settle]
 
 
 def _to_be_peened(design: Design, chamber: Chamber) -> dict[str, Chamber]:

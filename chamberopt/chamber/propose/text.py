@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,6 +21,11 @@ from chamberopt.design.load import Design, with_paths_from
 MAX_LISTED = 20  # surfaces in a comment
 EVALUATIONS, SEARCH_HALF_WIDTH = 20, 0.04
 SEARCH_REPLICAS = 4
+# At the beginning of a clause of a reason: the clause is to be settled, unless a standard's name
+# begins it.
+TO_SETTLE = re.compile(r"[A-Z][A-Z-]+(?: [A-Z-]{2,})*\b")
+STANDARD = "SAE "
+TARGET = "part.target"  # its reason begins with its name
 
 
 class Goal(NamedTuple):
@@ -45,6 +51,51 @@ FASTEST = Goal(
 )
 
 
+def clauses(reason: str) -> tuple[list[str], list[str]]:
+    """Return the clauses of a reason: why a value is so, and what is to be settled about it."""
+    why: list[str] = []
+    settle: list[str] = []
+    for clause in filter(None, one_line(reason).split("; ")):
+        found = TO_SETTLE.match(clause)
+        marks = found is not None and len(found[0]) > 3 and not found[0].startswith(STANDARD)
+        (settle if marks else why).append(clause)
+    return why, settle
+
+
+def _clauses_of(proposal: Proposal) -> dict[str, tuple[list[str], list[str]]]:
+    """Return the clauses of each reason, by its key. A target's name is never to be settled."""
+    found = {key: clauses(reason) for key, reason in proposal.reasons.items()}
+    if reason := proposal.reasons.get(TARGET):
+        name, colon, rest = one_line(reason).partition(": ")
+        (first, *why), settle = clauses(f"-{rest}")  # a dash begins nothing to settle
+        found[TARGET] = [f"{name}{colon}{first[1:]}", *why], settle
+    return found
+
+
+def to_settle(proposal: Proposal, left_out: Sequence[LeftOut]) -> list[str]:
+    """Return what is to be settled before the proposed chamber is built, the target first.
+
+    What follows is in the order of the design file.
+
+    Args:
+        left_out: what may be left out of the target, or is peened beside it.
+    """
+    tables = ["part.target", *proposal.tables]
+
+    def place(key: str) -> int:
+        table = key.rpartition(".")[0]
+        return next((k for k, one in enumerate(tables) if one in (key, table)), len(tables))
+
+    said = _clauses_of(proposal)
+    found = [one for key in sorted(said, key=place) for one in said[key][1]]
+    for one in left_out:
+        keys = " and ".join(f"part.target.{key}" for key in one.keys)
+        many = "" if len(one.keys) > 1 else "s"
+        leave = f": {keys} in the design leave{many} it out" if keys else ""
+        found.append(f"{one_line(one.text)}{leave}")
+    return list(dict.fromkeys(found))
+
+
 def design_text(proposal: Proposal, folder: Path, left_out: Sequence[LeftOut] = ()) -> str:
     """Return the text of the proposed design file.
 
@@ -55,15 +106,18 @@ def design_text(proposal: Proposal, folder: Path, left_out: Sequence[LeftOut] = 
     tables = with_paths_from(folder.resolve(), proposal.tables)
     name = Path(tables["part"]["mesh"]).name
     rules = "proposed by `chamberopt new`: rules of thumb to vary."
-    lines = [f"# A first chamber for {one_line(name)}, {rules}"]
+    lines = [f"# A first chamber for {one_line(name)}, {rules}", ""]
+    if settle := to_settle(proposal, left_out):
+        lines += ["to_settle = [  # before it is built; take out what is settled"]
+        lines += [*(f"  {_line('', one)[3:]}," for one in settle), "]"]
+    why = {key: "; ".join(said[0]) for key, said in _clauses_of(proposal).items()}
     for table, values in tables.items():
-        reason = proposal.reasons.get(table)
-        title = f"[{table}]" + (f"  # {one_line(reason)}" if reason else "")
+        title = f"[{table}]" + (f"  # {why[table]}" if why.get(table) else "")
         lines += ["", title] if table else [""]  # "" is the file's top, above all tables
         quoted = {f'"{key}"' if "." in key else key: one for key, one in values.items()}
-        lines += _values(quoted, table, proposal.reasons)
+        lines += _values(quoted, table, why)
         if table == "process" and "intensity_mmA" not in values and INTENSITY in proposal.reasons:
-            lines.append(f"# Almen intensity: {proposal.reasons[INTENSITY]}")
+            lines.append(f"# Almen intensity: {why[INTENSITY]}")
         if table == "part.target":
             lines += _left_out(left_out)
             lines += _choices(proposal.known)
@@ -184,7 +238,6 @@ def _left_out(offers: Sequence[LeftOut]) -> list[str]:
     lines = []
     for one in offers:
         if not one.keys:
-            lines.append(f"# {one_line(one.text)}")
             continue
         first, *more = (_line(key, value) for key, value in one.keys.items())
         also = ", with the next line" if more else ""

@@ -116,6 +116,17 @@ def test_a_turning_part_is_described_in_the_chambers_frame() -> None:
     assert "part_turn" not in describe(*made("plate"))
 
 
+def test_what_is_to_be_settled_is_warned_of_until_it_is_taken_out(
+    gear: tuple[Design, Chamber],
+) -> None:
+    design, chamber = gear
+    matter = "CHOSEN BY SIZE ALONE: confirm it"
+    open_one = design.changed({"to_settle": [matter]})
+    new = set(warnings(open_one, chamber)) - set(warnings(design, chamber))
+    assert new == {f"to be settled: {matter}"}
+    assert open_one.changed({"to_settle": []}) == design
+
+
 def test_a_part_through_the_side_wall_is_warned_of(gear: tuple[Design, Chamber]) -> None:
     """No warning for a shaft through the ceiling, a lid, or a shaft that turns in the wall."""
     assert not any("side wall between z" in text for text in warnings(*gear))
