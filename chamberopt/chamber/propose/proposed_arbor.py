@@ -34,7 +34,13 @@ OPEN, ROUND, FREE = 0.2, 0.9, 0.95
 THINNEST = 4e-3  # m: of a bore whose arbor holds a part
 # Of flanges: diameter over the bore's, least of it, and thickness over the bore's diameter and [m].
 FLANGE, LEAST_FLANGE, THICK, THINNEST_FLANGE = 1.6, 1.2, 0.1, 2e-3
-BESIDE = 2.0  # ball diameters between cups and the target, so that balls get there
+# Between wide flanges and the target, so that balls get there: ball diameters, and a share of how
+# far the flanges stand out of where they close on the part. With cups at 0.25 of it the rim of the
+# disc of tests/helpers/more_parts.py took 3000 ± 700 s, at 0.5 1920 ± 290, without 1670 ± 250.
+BESIDE, OPENING = 2.0, 0.5
+# To the narrowest flanges that close on the part no worse than the widest: step of their diameter,
+# and width of the rim that has to lie on it, so that no hole ends right beneath.
+WIDER_MM, RIM_MM = 0.5, 1.0
 UPRIGHT, LEVEL = 0.999, 0.02  # cosines with the vertical of an axis that is upright, and level
 # A part turns about a bore's axis if its target looks the same all round: largest difference of the
 # spread of its normals over their mean, their mean along any way, and the middle's distance from
@@ -109,13 +115,14 @@ def arbor_through(
     """Return the keys of [holder] of an arbor through a bore, and the reason for it.
 
     An upright one goes out through the ceiling, a level one through both side walls. The result is
-    None for another axis, if the arbor would hide some of the target, or if cups are wanted and the
-    part is not hollow beside its hub.
+    None for another axis, if the arbor would hide some of the target, or if wide flanges are wanted
+    and would not close on the part all round at both ends.
 
     Args:
         target: marks the triangles to be peened, (m,).
         ball: diameter of a ball [m], which must get past the arbor to the target.
-        with_cups: whether its flanges are cups, which mask all but what is near the target.
+        with_cups: whether its flanges mask all but what is near the target, as cups if the part is
+            hollow beside its hub.
     """
     axis = rotation_matrix(turns) @ bore.axis
     frame = frame_along(bore.axis)
@@ -136,13 +143,22 @@ def arbor_through(
         f"an arbor through the bore of {2e3 * bore.radius:.4g} mm, which is not peened, and {where}"
     )
     if with_cups:
-        cup = math.floor(4e3 * (away - BESIDE * ball)) / 2.0
-        depth = _depth_of_seat(bore, mesh, 5e-4 * cup, 0.5 * ball)
-        if depth < 0.5 * ball:
+        even, widest = 0.5 * ball, math.floor(4e3 * (away - BESIDE * ball)) / 2.0
+        depth = _depth_of_seat(bore, mesh, 5e-4 * widest, even)
+        if depth < -even:
             return None
-        keys |= {"diameter_mm": cup, "thickness_mm": 1e3 * THINNEST_FLANGE}
+        out = max(depth, 0.0) + THINNEST_FLANGE
+        wide = min(math.floor(4e3 * (away - OPENING * out)) / 2.0, widest)
+        while wide < widest and not all(
+            abs(_depth_of_seat(bore, mesh, 5e-4 * one, even) - depth) <= even
+            for one in np.arange(wide - 2.0 * RIM_MM, wide + 0.5 * WIDER_MM, WIDER_MM)
+        ):
+            wide = min(wide + WIDER_MM, widest)
+        keys |= {"diameter_mm": wide, "thickness_mm": 1e3 * THINNEST_FLANGE}
+        if depth < even:
+            return keys, f"{text}; flanges of {wide:g} mm on it mask the ends of the part"
         keys["grip_mm"] = round(1e3 * depth, 2)
-        cups = f"cups of {cup:g} mm on it, which close on the part round hub and holes, mask these"
+        cups = f"cups of {wide:g} mm on it, which close on the part round hub and holes, mask these"
         return keys, f"{text}; {cups}"
     flange = math.floor(2e3 * 2.0 * min(FLANGE * bore.radius, away - ball)) / 2.0
     if 1e-3 * flange > 2.0 * LEAST_FLANGE * bore.radius:
@@ -156,11 +172,12 @@ def arbor_through(
 def _depth_of_seat(bore: Bore, mesh: PartMesh, radius: float, even: float) -> float:
     """Return how far inside the ends of a bore the part's faces are at a radius about it [m].
 
-    It is the same at both ends, the smaller one; -inf where the faces are not even all round.
+    It is the smaller one of both ends; -inf where the faces are not even all round, or the ends are
+    not alike.
 
     Args:
         radius: of the seat [m], which is wider than the bore.
-        even: largest difference of heights along the seat [m].
+        even: largest difference of heights along the seat, and of the depths of both ends [m].
     """
     frame = frame_along(bore.axis)
     places = (mesh.vertices - bore.point) @ frame.T
@@ -180,7 +197,7 @@ def _depth_of_seat(bore: Bore, mesh: PartMesh, radius: float, even: float) -> fl
         if not seat.size or np.ptp(seat) > even:
             return -math.inf
         depths.append(0.5 * float(np.ptp(wall)) - float(seat.max()))
-    return min(depths)
+    return min(depths) if np.ptp(depths) <= even else -math.inf
 
 
 def turning_bore(bores: Sequence[Bore], mesh: PartMesh, target: np.ndarray) -> Bore | None:
