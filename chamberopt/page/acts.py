@@ -29,6 +29,7 @@ from chamberopt.page.answers import part_answer, shape_answer, step_texts
 from chamberopt.page.checker import Checker
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
+from chamberopt.page.page_words import on_page
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
 from chamberopt.page.structure import picked_surfaces, restructured, with_added_step
@@ -336,6 +337,7 @@ def _told_of(file: EditedFile) -> dict[str, object]:
         "fields": design_fields(file),
         "surfaces": picked_surfaces(design),
         "steps": step_texts(design),
+        "to_settle": [{"text": one, "words": on_page(one)} for one in design.to_settle],
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from chamberopt.chamber.bores_and_deflectors import on_deflectors
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.check import first_warnings, notes, shot_reach
+from chamberopt.chamber.checks.check import first_warnings, matters, notes, shot_reach
 from chamberopt.chamber.checks.facts import describe, first_facts, with_clearance
 from chamberopt.chamber.part import chosen_on_part, chosen_triangles, named_surface, preview_part
 from chamberopt.chamber.propose.proposed_target import named_surfaces
@@ -114,7 +114,7 @@ def check_answers(design: Design, step: int = 0) -> Iterator[bytes]:
     head: dict[str, Any] = {
         "facts": _facts(design, with_clearance(first_facts(design, whole), mesh)),
         "notes": [on_page(text) for text in notes(design, whole)],
-        "warnings": [on_page(text) for text in first_warnings(design, whole, mesh)],
+        "warnings": _warnings(design, first_warnings(design, whole, mesh)),
     }
     part = chamber.part
     chosen = {name: chosen_on_part(one, at, f"{name}.at") for name, at in _fixture_faces(one)}
@@ -129,8 +129,15 @@ def check_answers(design: Design, step: int = 0) -> Iterator[bytes]:
     found = describe(design, whole)
     share = reached_part_share(reach, chamber.source, len(part.triangles))
     state[part.target & (chamber.exposed_area > 0.0) & (share <= 0.5)] = MISSED
-    head = {name: [on_page(text) for text in found[name]] for name in ("notes", "warnings")}
+    said = [on_page(text) for text in found["notes"]], _warnings(design, found["warnings"])
+    head = dict(zip(("notes", "warnings"), said, strict=True))
     yield packed({"facts": _facts(design, found), **head}, state=state)
+
+
+def _warnings(design: Design, texts: Sequence[str]) -> list[Words]:
+    """Return warnings in words, without what is to be settled, of which the page has a list."""
+    known = matters(design)
+    return [on_page(text) for text in texts if text not in known]
 
 
 def _facts(design: Design, found: Mapping[str, Any]) -> list[tuple[str, list[Words]]]:

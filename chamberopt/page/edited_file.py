@@ -41,10 +41,11 @@ from chamberopt.page.structure import (
 Changes = Mapping[str, Any]
 LONGEST_SAVE_S = 5.0  # wait for another page's save, which takes a tenth of a second
 LATE_WRITE_S = 0.05  # an editor takes far less from opening a file to writing it
+TO_SETTLE = "to_settle"  # from which the page takes out what is settled
 # Keys that the page changes beside its fields: zones, and the faces of target, zone or fixture.
 PICKED = re.compile(
     r"(part\.target|zones\.\d+\.target|holder\.at|mask\.at)"
-    r"\.(surface|faces|direction|angle_deg|box_mm|radius_mm|cut)|zones\.\d+"
+    rf"\.(surface|faces|direction|angle_deg|box_mm|radius_mm|cut)|zones\.\d+|{TO_SETTLE}"
 )
 
 
@@ -206,6 +207,9 @@ class EditedFile:
                 raise InputError(f"{name}: nothing given; give a number")
             if last in table:
                 del table[last]
+        elif name == TO_SETTLE:
+            for one in [one for one in table[last] if one not in value]:
+                table[last].remove(one)
         elif not isinstance(table, list):
             table[last] = _inline(value)
         elif int(last) < len(table):

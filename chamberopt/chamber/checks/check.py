@@ -184,7 +184,12 @@ def first_warnings(
             f"{shot.ball_mass * 1e6:.3g} mg: the charge differs by more than 5 %"
         )
     texts += calibration_warnings(design)
-    return texts + [f"to be settled: {one_line(text)}" for text in design.to_settle]
+    return texts + matters(design)
+
+
+def matters(design: Design) -> list[str]:
+    """Return a warning of each matter that is to be settled before the chamber is built."""
+    return [f"to be settled: {one_line(text)}" for text in design.to_settle]
 
 
 def _to_be_peened(design: Design, chamber: Chamber) -> dict[str, Chamber]:

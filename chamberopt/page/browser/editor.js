@@ -4,7 +4,7 @@ import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import "./study/study.js";
-import { addStep, ask, attempt, element, isUnsaved, listen, onPage, read, say, showAdded, showStep, state, takeTold, undo, unpack, warning, wordsOf } from "./state.js";
+import { addStep, ask, attempt, change, element, isUnsaved, listen, onPage, read, say, showAdded, showStep, state, takeTold, undo, unpack, warning, wordsOf } from "./state.js";
 import { lookAnew, setHandles, showCavity, showPart, showShape, showState } from "./scene.js";
 
 const find = (id) => document.getElementById(id);
@@ -114,6 +114,18 @@ function refuse(text) {
   find("error").hidden = !text;
 }
 
+// What is to be settled before the chamber is built, each until a click says that it is.
+function fillSettle() {
+  const open = state.changes.to_settle ?? state.file.to_settle.map((one) => one.text);
+  const rows = state.file.to_settle.filter((one) => open.includes(one.text)).map((one) => {
+    const done = element("button", { type: "button", textContent: "Settled", title: "take it out of the design" });
+    done.addEventListener("click", () => change({ to_settle: open.filter((text) => text !== one.text) }));
+    return element("li", {}, element("span", {}, ...onPage(one.words)), done);
+  });
+  const list = element("ol", {}, ...rows);
+  find("settle").replaceChildren(...rows.length ? [element("h2", { textContent: "To be settled before it is built" }), list] : []);
+}
+
 function sayOf({ facts, warnings, notes }) {
   const list = (texts) => texts.map((text) => element("li", {}, ...onPage(text)));
   find("warnings").replaceChildren(...warnings.map(warning));
@@ -132,6 +144,7 @@ listen((what) => {
     fillTarget();
     fillRun();
     fillSteps();
+    fillSettle();
     asked = null;
   } else if (what === "step") {
     fillSteps();
@@ -140,6 +153,7 @@ listen((what) => {
     lookAnew();
   } else {
     showValues();
+    fillSettle();
     followFields();
     fillSurfaces();
     showChosen();

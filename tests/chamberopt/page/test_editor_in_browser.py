@@ -128,6 +128,25 @@ def test_shape_and_holder_are_chosen_in_words(opened: Page) -> None:
     assert page.locator("#undo").is_disabled()
 
 
+def test_what_is_settled_is_taken_out_of_the_file(opened: Page) -> None:
+    page, file = opened.page, opened.served.folder / "design.toml"
+    text = file.read_text()
+    file.write_text(f'to_settle = [\n  "LONG: see",\n  "NOT MASKED: ask",\n]\n{text}')
+    page.click("#reload")
+    listed = page.locator("#settle li")
+    expect(listed).to_have_count(2, timeout=WAIT)
+    opened.wait("data-checked=reach")
+    assert "to be settled" not in (page.locator("#warnings").text_content() or "")
+    listed.first.locator("button").click()
+    expect(listed).to_have_count(1, timeout=WAIT)
+    expect(listed).to_contain_text("NOT MASKED: ask")
+    opened.saved()
+    assert file.read_text() == f'to_settle = [\n  "NOT MASKED: ask",\n]\n{text}'
+    file.write_text(text)
+    page.click("#reload")
+    expect(listed).to_have_count(0, timeout=WAIT)
+
+
 def test_a_step_is_added_and_shown(opened: Page) -> None:
     page = opened.page
     page.click("#new-step summary")
