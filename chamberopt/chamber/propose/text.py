@@ -63,8 +63,13 @@ def clauses(reason: str) -> tuple[list[str], list[str]]:
 
 
 def _clauses_of(proposal: Proposal) -> dict[str, tuple[list[str], list[str]]]:
-    """Return the clauses of each reason, by its key. A target's name is never to be settled."""
-    found = {key: clauses(reason) for key, reason in proposal.reasons.items()}
+    """Return the clauses of each reason, by its key, but for keys that the design has not.
+
+    A target's name is never to be settled.
+    """
+    own = {INTENSITY, *proposal.tables}
+    own |= {f"{table}.{key}" for table, values in proposal.tables.items() for key in values}
+    found = {key: clauses(reason) for key, reason in proposal.reasons.items() if key in own}
     if reason := proposal.reasons.get(TARGET):
         name, colon, rest = one_line(reason).partition(": ")
         (first, *why), settle = clauses(f"-{rest}")  # a dash begins nothing to settle
