@@ -208,9 +208,8 @@ def test_a_guess_is_said_and_no_folder_is_held_while_the_design_is_made(
     made = sorted(one.name for one in Path("out").iterdir())
     assert made == ["design.toml", "study.toml"]
     assert load_study("out/study.toml").objective.name == "uniform_coverage"
-    assert "# UNIT GUESSED: the part measures" in Path("out/design.toml").read_text(
-        encoding="utf-8"
-    )
+    settle = load_design("out/design.toml").to_settle
+    assert "UNIT GUESSED: the part measures 20 x 20 x 30 mm" in settle
     assert "a pad on the level top, up to the ceiling: no ball lies there" in said.out
     design = load_design("out/design.toml")
     assert design.mask is not None
