@@ -49,10 +49,15 @@ JAMMED = 0.01  # least share of the shot's time, or of the impacts, in gaps that
 def alarms(result: Result) -> Iterator[str]:
     """Yield the reasons not to use the sheet as it stands.
 
-    They are figures that are not resolved, balls that jam, a shot that had not settled, a time that
-    leaves the target bare or is too short for the wanted coverage, and an intensity outside of its
-    range.
+    They are matters that are to be settled first, figures that are not resolved, balls that jam, a
+    shot that had not settled, a time that leaves the target bare or is too short for the wanted
+    coverage, and an intensity outside of its range.
     """
+    if count := len(result.design.to_settle):
+        yield (
+            f"{count} matter{'s are' if count > 1 else ' is'} to be settled before this is built: "
+            "see Warnings."
+        )
     told = _expected_figures(result)
     if result.design.calibration is None:  # without one they are rough, resolved or not
         told = [row for row in told if row.name not in OF_STRIPS]

@@ -224,6 +224,10 @@ def test_what_forbids_to_use_it_is_in_red(folder: Path) -> None:
     lively = result.record.model_copy(update={"first_half_excess": 0.12})
     (told,) = [text for text in alarms(replace(result, record=lively)) if "not settled" in text]
     assert "dented by 12 % more in the first half" in told
+    for few, words in ((1, "1 matter is to"), (2, "2 matters are to")):
+        open_one = result.design.changed({"to_settle": ["NOT MASKED: ask"] * few})
+        (told,) = [text for text in alarms(replace(result, design=open_one)) if "matter" in text]
+        assert told.startswith(words)
     metrics = result.metrics
     metrics.update(mean_coverage=Estimate(0.57, 0.03), time_to_98_s=Estimate(900.0, 50.0))
     assert [text for text in alarms(result) if "too short" in text] == [
