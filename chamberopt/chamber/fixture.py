@@ -10,8 +10,8 @@ plugs, the convex hulls of the walls of holes.
          |__________|  start  |
       ___|  part    |___                  start: the lowest place of the clamped faces under it
 
-Both are walls: they neither move nor count as part. The part's faces under them are not in the
-cavity any more.
+Both are walls, and do not count as part; a holder turns with a part that turns. The part's faces
+under them are not in the cavity any more.
 """
 
 from __future__ import annotations
