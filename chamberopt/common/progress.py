@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 if TYPE_CHECKING:
     from rich.progress import Progress as Display
 
-# Called as progress(done, total, best value so far or None).
+# Called as progress(done, total, best value so far or None); total is 0 where it is not known.
 Progress = Callable[[int, int, "float | None"], None]
 
 # s until a step gets a line in a log; each further line comes after twice the time
@@ -103,8 +103,8 @@ def _is_notebook() -> bool:
 
 def _update(display: Display, row: Any, done: int, total: int, best: float | None) -> None:
     best_text = "" if best is None else f"best {best:.4f}"
-    count = f"{done:,}/{total:,}"
-    display.update(row, completed=done, total=total, count=count, best=best_text, left="left")
+    count, left = (f"{done:,}/{total:,}", "left") if total else (f"{done:,} so far", "")
+    display.update(row, completed=done, total=total or None, count=count, best=best_text, left=left)
 
 
 @contextmanager

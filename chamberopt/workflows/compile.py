@@ -43,7 +43,7 @@ def compile_for(
     if sim_core.is_compiled(*variant):
         return
     tell("compiling the simulator (once per set of effects) ...")
-    with step("compiling, functions") as progress:
-        sim_core.compile_simulator(*variant, lambda done, total: progress(done, total, None))
+    with step("compiling the simulator (once), functions") as progress:
+        sim_core.compile_simulator(*variant, lambda done: progress(done, 0, None))
     if not sim_core.is_compiled(*variant):
         tell("compiled code cannot be kept: set NUMBA_CACHE_DIR to a folder of your own")

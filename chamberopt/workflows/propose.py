@@ -6,8 +6,8 @@ amplitude, and tell its treatment time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -37,6 +37,7 @@ from chamberopt.chamber.propose.text import design_text, study_texts
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import local_executor
 from chamberopt.common.files import claim_folder, whole_or_nothing, write_text
+from chamberopt.common.progress import no_steps
 from chamberopt.common.toml_fields import allowed_range
 from chamberopt.design.intensity import WantedIntensity
 from chamberopt.design.process import Process
@@ -59,7 +60,12 @@ if TYPE_CHECKING:
 USUAL, NONE = "usual", "none"  # in the place of an intensity
 Chooser = Callable[["Sequence[Surface]"], Sequence[str]]
 DESIGN, PICTURE = "design.toml", "design.png"
-PILOT = "pilot run (--no-pilot leaves it out)"
+# Stages of the work in their order; those between are of pilots, and the rules may skip some.
+SIZES, PICTURE_OF = "reading the part and choosing sizes", "drawing the target"
+TIME, WAYS = "simulating briefly, for the treatment time", "trying other poses and charges"
+INTENSITY = "choosing balls and amplitude for the intensity"
+FURTHER_STEP, WRITING = "trying a second pose and finer balls", "drawing and writing the proposal"
+Begin = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -114,6 +120,27 @@ class Proposed:
     studies: Sequence[str]
 
 
+@contextmanager
+def stages(teller: Teller, pilot: bool) -> Iterator[Begin]:
+    """Yield the function that begins a stage of a proposal, and ends the one before.
+
+    Stages are numbered, and their number never falls.
+
+    Args:
+        pilot: whether pilots are simulated.
+    """
+    of_pilots = (TIME, WAYS, INTENSITY, FURTHER_STEP) if pilot else ()
+    order = [SIZES, PICTURE_OF, *of_pilots, WRITING]
+    with ExitStack() as now:
+
+        def begin(stage: str) -> None:
+            now.close()
+            number = order.index(stage) + 1
+            now.enter_context(teller.step(f"step {number} of {len(order)}: {stage}"))
+
+        yield begin
+
+
 def require_file(part: Path) -> None:
     """Raise InputError unless the part is a plain file whose name can stand in a design file."""
     if not part.is_file():
@@ -151,18 +178,19 @@ def write_proposal(
         folder = kept.enter_context(claim_folder(out))
         kept.enter_context(whole_or_nothing(folder))
         executor = kept.enter_context(local_executor(workers))
-        return _written(first, _Pilots(path, wishes, choose, executor, teller), folder)
+        begin = kept.enter_context(stages(teller, wishes.pilot))
+        return _written(first, _Pilots(path, wishes, choose, executor, teller, begin), folder)
 
 
 def _written(first: Proposal, pilots: _Pilots, folder: Path) -> Proposed:
     """Write what pilots make of a first proposal into a folder."""
     teller = pilots.teller
-    with teller.step("drawing"):  # before the pilots, so that it can be looked at meanwhile
-        teller.tell(draw_target(first.design, first.chamber, folder / PICTURE))
+    pilots.begin(PICTURE_OF)  # before the pilots, so that it can be looked at meanwhile
+    teller.tell(draw_target(first.design, first.chamber, folder / PICTURE))
     made = pilots.improve(first) if pilots.wishes.pilot else first
+    pilots.begin(WRITING)
     if made.chamber is not first.chamber:
-        with teller.step("drawing"):
-            teller.tell(draw_target(made.design, made.chamber, folder / PICTURE))
+        teller.tell(draw_target(made.design, made.chamber, folder / PICTURE))
     left_out = find_left_out(made)
     write_text(folder / DESIGN, design_text(made, folder, left_out))
     studies = study_texts(made, DESIGN)
@@ -180,6 +208,7 @@ class _Pilots:
     choose: Chooser
     executor: Executor
     teller: Teller
+    begin: Begin
 
     def improve(self, first: Proposal) -> Proposal:
         """Return a proposal that pilots chose, with its treatment time and what to simulate.
@@ -187,7 +216,9 @@ class _Pilots:
         Raises InputError if an intensity that was asked for cannot be told.
         """
         quietly = partial(self._measure, is_told=False)
+        self.begin(TIME)
         way = Way(first, self.wishes.geometry, self._measure(first))
+        self.begin(WAYS)
         made, wanted, found = propose_quicker(way, self._again, quietly)
         why_so = {"part.rotate_deg": made.reasons["part.rotate_deg"]}
         intensity, asked = self.wishes.intensity, self.wishes.asked_intensity()
@@ -197,6 +228,7 @@ class _Pilots:
             asked = usual_for(made)
         by_geometry = setting_of(made).ball_mm
         if asked:
+            self.begin(INTENSITY)
             try:
                 made = propose_intensity(made, wanted, asked, self._again, self._predict)
             except InputError:  # which is no reason to stop if nobody asked
@@ -206,6 +238,7 @@ class _Pilots:
         if not asked:
             if found is not None:
                 made = with_expected_intensity(made, found.intensity)
+            self.begin(FURTHER_STEP)
             return _in_budget(*propose_second_pose(made, found, quietly))
         if wanted.pose != self.wishes.geometry.pose:  # by pilots, and not as asked
             made = replace(made, reasons={**made.reasons, **why_so})
@@ -214,6 +247,7 @@ class _Pilots:
         coarse = larger or (made, found)
         if seeks:
             made, coarse = as_no_wish(made), (as_no_wish(coarse[0]), coarse[1])
+        self.begin(FURTHER_STEP)
         coarse = propose_second_pose(*coarse, quietly)
         two, why = with_finer_balls(*coarse, by_geometry, quietly)
         if two is not None:
@@ -224,7 +258,8 @@ class _Pilots:
         return _in_budget(*propose_second_pose(made, found, quietly))
 
     def _again(self, other: Wanted) -> Proposal:
-        return propose(self.path, other, self.choose)
+        with no_steps():  # those of the first proposal, again
+            return propose(self.path, other, self.choose)
 
     def _measure(self, made: Proposal, is_told: bool = True) -> Measured | None:
         """Return what the budget of a proposal follows from; None where no pilot can tell it.
@@ -233,7 +268,7 @@ class _Pilots:
         """
         try:
             self.teller.compile(made.design, made.chamber, None)
-            with self.teller.step(PILOT) as progress:
+            with self.teller.step("pilot run") as progress:
                 return measure_budget(made.design, made.chamber, self.executor, progress)
         except (InputError, SimulationError) as error:
             text = f"warning: no pilot, treatment and simulated time are starts: {error}"

@@ -21,10 +21,6 @@ from sim_core.numerics.jit import CACHE_FOLDER, CACHED, compilations_counted
 from sim_core.scene.physics import Physics
 from sim_core.scene.scene import Scene
 
-# Approximate number of functions that are compiled for the first set of effects, and for a further
-# set. Most functions serve all sets.
-FIRST_SET, FURTHER_SET = 200, 50
-
 
 def _marker(physics: Physics, balls: int, alike: bool, cylinder: bool) -> Path:
     """Return the path of the file that exists if the code for such a scene has been compiled.
@@ -56,7 +52,7 @@ def compile_simulator(
     balls: int = 1,
     alike: bool = True,
     cylinder: bool = False,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Callable[[int], None] = lambda done: None,
 ) -> float:
     """Compile the code of a scene with these effects, or load it from the cache.
 
@@ -64,8 +60,8 @@ def compile_simulator(
         balls: number of balls.
         alike: True if all balls have one size and density.
         cylinder: True in an analytical cylinder, False in a mesh or a prism.
-        progress: called as progress(done, total) after each compiled function. ``total`` is a
-            guess.
+        progress: called as progress(done) after each compiled function. How many there will be is
+            not known, as most functions serve several sets of effects.
 
     Returns:
         Duration of the compilation [s].
@@ -104,11 +100,7 @@ def compile_simulator(
         if cylinder
         else mesh
     )
-    usual = FURTHER_SET if any(CACHE_FOLDER.glob("compiled-*")) else FIRST_SET
-    with (
-        _few_collections(),
-        compilations_counted(lambda done: progress(done, max(usual, done + 1))),
-    ):
+    with _few_collections(), compilations_counted(progress):
         simulate(Scene(room, shot, physics, duration=0.01))
     if CACHED:
         with contextlib.suppress(OSError):  # such as a full disk

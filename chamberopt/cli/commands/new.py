@@ -93,7 +93,14 @@ def new(
     from chamberopt.common.files import claim_folder
     from chamberopt.documents.proposal import proposal_in_words, proposal_lines
     from chamberopt.geometry.meshes.units import STATED, UnknownUnitError
-    from chamberopt.workflows.propose import DESIGN, Wishes, require_file, write_proposal
+    from chamberopt.workflows.propose import (
+        DESIGN,
+        SIZES,
+        Wishes,
+        require_file,
+        stages,
+        write_proposal,
+    )
 
     require_file(part)
     if PICK in target and not sys.stdin.isatty():
@@ -117,8 +124,12 @@ def new(
     out = out or Path(part.stem if part.suffix else f"{part.name}_chamber")
     with claim_folder(out):
         pass  # reports a folder that is taken before the work begins
+    teller = TerminalTeller()
     try:
-        made = propose(part, wanted, choose)
+        with stages(teller, pilot) as begin:
+            if PICK not in target:  # which asks below the lines of steps
+                begin(SIZES)
+            made = propose(part, wanted, choose)
     except UnknownUnitError as error:
         if not sys.stdin.isatty():
             raise
@@ -126,7 +137,7 @@ def new(
         wishes = replace(wishes, geometry=wanted)
         made = propose(part, wanted, choose)
 
-    done = write_proposal(made, part, wishes, choose, out, TerminalTeller())
+    done = write_proposal(made, part, wishes, choose, out, teller)
     words = proposal_in_words(done.made, done.left_out)
     if not json:
         show(proposal_lines(words, verbose))

@@ -1,6 +1,6 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
 import { ask, attempt, element, onPage, warning, wordsOf } from "./state.js";
-import { bars, followed, sinceBegin } from "./steps.js";
+import { followed, sinceBegin, stage } from "./steps.js";
 
 const find = (id) => document.getElementById(id);
 const option = (one) => element("option", { value: [one].flat()[0], textContent: [one].flat().at(-1) }); // a text, or a pair with its words
@@ -87,8 +87,8 @@ let drawn = 0; // when the picture that is shown was drawn
 function tell({ steps, seconds, lines, warnings, fault, exit, picture, result, proposal }) {
   find("made").hidden = false;
   find("stop").hidden = exit !== null;
-  find("busy").textContent = exit !== null ? "" : `${sinceBegin(seconds)}${steps.length ? "" : ": reading the part and choosing sizes …"}`;
-  find("progress").replaceChildren(...bars(steps));
+  find("busy").textContent = exit !== null ? "" : sinceBegin(seconds);
+  if (exit !== null || steps.length) find("progress").replaceChildren(...(exit === null ? stage(steps) : []));
   find("warnings").replaceChildren(...warnings.map(warning));
   find("printed").textContent = lines.join("\n");
   find("printed-fold").hidden = exit === null || !lines.length;

@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -284,8 +285,13 @@ def test_a_usual_intensity_that_no_pilot_tells_is_no_reason_to_stop(
     monkeypatch.setattr("chamberopt.workflows.propose.predict_intensity", lambda *_: None)
     monkeypatch.setattr("chamberopt.workflows.propose.draw_target", lambda *_: "no picture")
     words = ["new", "box.stl", "--unit", "mm", "--material", "Ti-6Al-4V"]
+    monkeypatch.setattr("chamberopt.common.progress._json_lines", True)
     assert main(words) == 0
-    said = capfd.readouterr().out
+    said, remarks = capfd.readouterr()
+    begun = [line for line in remarks.splitlines() if '"done"' in line]
+    numbers = [int(one) for one in re.findall(r'"step (\d) of 7: ', "".join(begun))]
+    assert numbers == sorted(numbers) == [1, 2, 3, 4, 5, 6, 7]
+    assert sum("reading the part" in line for line in begun) == 2  # of the stage, and in it
     assert "intensity    expected 0.9 mmA x/÷ 2.5\n" in said
     assert "0.15-0.25A are usual for titanium" in said
     assert main([*words, "--intensity", "usual", "--out", "asked"]) == 2
