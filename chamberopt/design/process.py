@@ -18,7 +18,8 @@ from chamberopt.design.table_base import SI, FileTable
 MIN_POINTS, MAX_POINTS = 1_000, 1_000_000  # limits on the number of coverage windows
 MAX_STEPS = 10
 NONE = "none"  # in the place of a holder or mask that a step does not have
-NAME = "a name in quotes of at most 40 letters, digits and _, no digit first"
+LONGEST_NAME = 40
+NAME = f"a name in quotes of at most {LONGEST_NAME} letters, digits and _, no digit first"
 OF_POSE = "rotate_deg", "offset_mm"
 # Keys of which a table has only one, so that a step's key takes the place of the design's other.
 EITHER_OR = (("diameter_mm", "mix"), ("amplitude_um", "amplitude_pv_um"))
@@ -114,9 +115,11 @@ class Step(FileTable):
     The first step is the design as its tables have it, and changes nothing.
     """
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40)] = Field(
-        description="e.g. turned: its figures are steps.turned.mean_coverage ...",
-        json_schema_extra={"form": NAME},
+    name: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=LONGEST_NAME)] = (
+        Field(
+            description="e.g. turned: its figures are steps.turned.mean_coverage ...",
+            json_schema_extra={"form": NAME},
+        )
     )
     time_share: float = quantity(
         1e-3, 1e6, "", "its part of process.treatment_time_s, over the sum of all steps' parts", 1.0

@@ -32,7 +32,13 @@ from chamberopt.page.further_study import write_further_study
 from chamberopt.page.page_words import on_page
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
-from chamberopt.page.structure import picked_surfaces, restructured, with_added_step
+from chamberopt.page.structure import (
+    KEPT,
+    picked_surfaces,
+    restructured,
+    with_added_step,
+    without_step,
+)
 from chamberopt.page.study_answers import candidate_answer, candidates_answer, model_answer, version
 from chamberopt.printers import terminal
 from chamberopt.printers.html import section
@@ -129,7 +135,9 @@ class Acts:
     def structure(self, asked: Any) -> dict[str, object]:
         """Return changes after which the design has another shape or kind of holder."""
         file, name, wanted = self._file(asked), str(asked["name"]), str(asked["value"])
-        return restructured(file.design, asked["changes"], name, wanted, file.with_changes)
+        changes = asked["changes"]
+        own = file.with_steps(changes[KEPT]).design if KEPT in changes else file.design
+        return restructured(own, changes, name, wanted, file.with_changes)
 
     def step(self, asked: Any) -> dict[str, object]:
         """Return changes after which the design has a further step."""
@@ -138,6 +146,12 @@ class Acts:
         made = with_added_step(design, changes, name, int(asked["step"]))
         self._file(asked).with_changes(made)  # so that a wrong name is told at once
         return made
+
+    def remove(self, asked: Any) -> dict[str, object]:
+        """Return changes after which the design lacks one of its steps."""
+        file, changes = self._file(asked), asked["changes"]
+        count = len(file.with_changes(changes).steps or ())
+        return without_step(file.design, changes, count, int(asked["step"]))
 
     def cavity(self, asked: Any) -> bytes:
         file = self._file(asked)

@@ -7,7 +7,7 @@ import re
 import stat
 import time
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from chamberopt.design.materials import BY_NAME
 from chamberopt.design.shapes.base import is_custom
 from chamberopt.page.page_words import choices, on_page
 from chamberopt.page.structure import (
+    KEPT,
     KIND,
     MASK_KIND,
     NO_HOLDER,
@@ -113,6 +114,9 @@ class EditedFile:
         import tomlkit
         from tomlkit.exceptions import TOMLKitError
 
+        if KEPT in changes:
+            others = {name: value for name, value in changes.items() if name != KEPT}
+            return self.with_steps(changes[KEPT]).changed_text(others)
         document, known = tomlkit.parse(self.text), field_names(self.design)
         # What is taken out goes first: it may be chosen anew after that.
         for name, value in sorted(changes.items(), key=lambda one: one[1] not in (None, "")):
@@ -132,6 +136,26 @@ class EditedFile:
                     "its table with a header of its own, as [part.target]"
                 ) from None
         return tomlkit.dumps(document) if changes else self.text
+
+    def with_steps(self, kept: Sequence[int]) -> EditedFile:
+        """Return the file as it would be with some of its steps alone.
+
+        Args:
+            kept: their numbers, in order; empty for none.
+        """
+        import tomlkit
+
+        steps, document = self.design.steps or (), tomlkit.parse(self.text)
+        for k in reversed(range(len(steps))):
+            if k not in kept:
+                del document["steps"][k]  # type: ignore[union-attr]
+        left = tuple(steps[k] for k in kept)
+        if not left:
+            document.pop("steps", None)
+        made = copy(self)
+        made.text = tomlkit.dumps(document)
+        made.design = self.design.model_copy(update={"steps": left or None})
+        return made
 
     def save(self, changes: Changes) -> None:
         """Write the file with some values changed; `changes` has new values by dotted name.

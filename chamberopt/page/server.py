@@ -132,8 +132,8 @@ SHOWN_FILES = {".html": "text/html", ".pdf": "application/pdf", ".png": "image/p
 # Names of requests to the front page and to that of a design; looks take no question, by GET.
 OF_FRONT, LOOKS_OF_FRONT = ("look", "propose", "open", "close", "stop"), ("front", "status")
 OF_DESIGN = (
-    "read", "part", "fields", "structure", "step", "shape", "cavity", "reach", "pick", "save",
-    "study", "start", "shown", "candidates", "candidate", "model", "resume", "more",
+    "read", "part", "fields", "structure", "step", "remove", "shape", "cavity", "reach", "pick",
+    "save", "study", "start", "shown", "candidates", "candidate", "model", "resume", "more",
 )  # fmt: skip
 LOOKS_OF_DESIGN = ("results",)
 CLOSED = "no design is open here any more: reload the page"

@@ -1,4 +1,4 @@
-"""Change the chamber's shape, the kind of holder or mask, or add a step, in an edited design.
+"""Change shape, kind of holder or mask, or the number of steps of an edited design.
 
 Each shape and each kind has keys of its own, which a change takes out or puts in.
 """
@@ -6,6 +6,7 @@ Each shape and each kind has keys of its own, which a change takes out or puts i
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -17,6 +18,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.design import shapes
 from chamberopt.design.design import Design
 from chamberopt.design.fixture import HOLDER_KEYS, Holder
+from chamberopt.design.process import LONGEST_NAME
 from chamberopt.design.shapes import ParametricChamber
 from chamberopt.geometry.triangles import area_vectors
 
@@ -30,6 +32,7 @@ MASK_KINDS: dict[str, dict[str, Any]] = {
 }
 OF_MASK = ("axis", "plugs", "thickness_mm")  # keys that a mask may have beside its faces
 STEP = re.compile(r"steps\.(\d+)(?=\.|$)")
+KEPT = "steps"  # numbers of the file's steps that stay; further keys count those that are left
 FIRST = "first"  # name of the step that the design without steps becomes
 # Tables whose keys a step may change on the page, and those that a further step is given.
 OF_STEP: dict[str, tuple[str, ...]] = {
@@ -113,12 +116,18 @@ def with_added_step(
     Args:
         design: the design with its changes until now.
         changes: new values by dotted name until now.
-        name: name of the further step.
+        name: name of the further step, in words.
         copied: number of the step that is copied.
 
     Raises:
-        InputError: the step has a holder, a mask or further sonotrodes of its own.
+        InputError: the step has a holder, a mask or further sonotrodes of its own, or its name is
+            that of another one.
     """
+    letters = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    name = re.sub(r"\W+", "_", letters).strip("_")
+    name = (name if name[:1].isalpha() else f"step_{name}")[:LONGEST_NAME]
+    if name in (FIRST, *(one.name for one in design.steps or ())):
+        raise InputError(f"name of the step: there is a step {name}; give another name")
     steps, each = design.steps or (), [*design.in_steps.values()]
     if not 0 <= copied < len(each):
         raise InputError(f"step: given {copied}; allowed: from 0 to {len(each) - 1}")
@@ -137,6 +146,32 @@ def with_added_step(
     added = {"name": name, "time_share": share} | {key: one for key, one in tables.items() if one}
     first = {} if steps else {"steps.0": {"name": FIRST}}
     return {**changes, **first, f"steps.{max(len(steps), 1)}": added}
+
+
+def without_step(
+    of_file: Design, changes: Mapping[str, Any], count: int, removed: int
+) -> dict[str, Any]:
+    """Return changes after which a design lacks one of its steps; the first alone is as no steps.
+
+    Args:
+        of_file: the design as its file has it.
+        changes: new values by dotted name until now.
+        count: number of steps with these changes.
+        removed: number of the step. The first is the design itself, and stays.
+    """
+    if not 0 < removed < count:
+        raise InputError(f"step: given {removed}; allowed: from 1 to {count - 1}")
+    kept = changes.get(KEPT, [*range(len(of_file.steps or ()))])
+    made = {KEPT: [] if count == 2 else [*kept[:removed], *kept[removed + 1 :]]}
+    for name, value in changes.items():
+        found = STEP.match(name)
+        if found is None and name != KEPT:
+            made[name] = value
+        elif found is not None and count > 2 and (number := int(found[1])) != removed:
+            made[f"steps.{number - (number > removed)}{name[found.end() :]}"] = value
+    if not of_file.steps:
+        del made[KEPT]
+    return made
 
 
 def _is_number(value: object) -> bool:

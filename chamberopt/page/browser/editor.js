@@ -4,7 +4,7 @@ import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import "./study/study.js";
-import { addStep, ask, attempt, change, element, isUnsaved, listen, onPage, read, say, showAdded, showStep, state, takeTold, undo, unpack, warning, wordsOf } from "./state.js";
+import { addStep, ask, attempt, change, element, isUnsaved, listen, onPage, read, removeStep, say, showAdded, showStep, state, takeTold, undo, unpack, warning, wordsOf } from "./state.js";
 import { lookAnew, setHandles, showCavity, showPart, showShape, showState } from "./scene.js";
 
 const find = (id) => document.getElementById(id);
@@ -18,7 +18,7 @@ for (const tab of document.querySelectorAll("nav button")) tab.addEventListener(
 });
 
 // Another shape, holder or mask has other numbers, also where a change is undone; steps have their times.
-const KINDS = /^(chamber\.shape|holder\.kind|mask\.kind|zones\.\d+|steps\..*|process\.treatment_time_s)$/;
+const KINDS = /^(chamber\.shape|holder\.kind|mask\.kind|zones\.\d+|steps(\..*)?|process\.treatment_time_s)$/;
 const structure = () => JSON.stringify(Object.entries(state.changes).filter(([name]) => KINDS.test(name)));
 let shownOf = "";
 async function followFields() {
@@ -46,12 +46,15 @@ function fillSteps() {
   find("step-buttons").replaceChildren(...state.steps.flatMap((text, k) => {
     const button = element("button", { textContent: text, ariaPressed: String(k === state.step) });
     button.addEventListener("click", () => { if (k !== state.step) showStep(k); });
-    return [button, " "];
+    if (!k) return [button]; // the first is the design itself
+    const cross = element("button", { textContent: "✕", ariaLabel: `Remove the step ${text}`, title: "remove this step" });
+    cross.addEventListener("click", () => attempt(() => removeStep(k)));
+    return [element("span", {}, button, cross)];
   }));
 }
 find("add-step").addEventListener("click", () => attempt(async () => {
   const name = find("step-name").value.trim();
-  if (!name) throw new Error("give the new step a name first, such as turned");
+  if (!name) throw new Error("give the new step a name first, such as second side");
   await addStep(name);
   find("step-name").value = "";
   find("new-step").open = false;

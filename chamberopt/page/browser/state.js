@@ -60,7 +60,9 @@ export function showStep(step) {
 }
 
 // What the file has, or where it has no such number, what the design with its shape or holder takes by default.
-export const original = (name) => [...state.file.fields, ...state.fields].find((one) => one.name === name)?.value ?? null;
+export const original = (name) => [...inFile(name), ...state.fields].find((one) => one.name === name)?.value ?? null;
+// Fields of the file by which a name stands for what it does now: not of a step where one is gone.
+const inFile = (name) => "steps" in state.changes && name.startsWith("steps.") ? [] : state.file.fields;
 export const value = (name) => name in state.changes ? state.changes[name] : original(name);
 
 // Change values by dotted name; null takes a key out of the file. A slider's moves are undone as one.
@@ -70,7 +72,7 @@ export function change(values, move = "") {
   state.move = move;
   state.changes = { ...state.changes, ...values };
   for (const name of Object.keys(values))
-    if (state.file.fields.some((one) => one.name === name) && state.changes[name] === original(name)) delete state.changes[name];
+    if (inFile(name).some((one) => one.name === name) && state.changes[name] === original(name)) delete state.changes[name];
   showChanges();
   tell("changed");
 }
@@ -89,6 +91,11 @@ export function showAdded() {
   if (added >= state.steps.length) return;
   showStep(added);
   added = Infinity;
+}
+
+export async function removeStep(step) {
+  await changeBy("/remove", { step });
+  if (state.step >= step) showStep(state.step - 1);
 }
 
 async function changeBy(path, asked) {

@@ -1,6 +1,7 @@
 """Saving a design from the page: one line differs, and nothing is written that would not load."""
 
 import difflib
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import trimesh
 
 from chamberopt.common.errors import InputError
 from chamberopt.page.edited_file import EditedFile, design_fields
-from chamberopt.page.structure import restructured, with_added_step
+from chamberopt.page.structure import restructured, with_added_step, without_step
 from tests.helpers.mesh_files import write_stl
 from tests.hunt.base import write_base
 
@@ -245,7 +246,37 @@ def test_a_step_is_added_as_a_copy_whose_numbers_are_then_changed(file: EditedFi
     assert not [one for one in differing(before, file.path.read_text()) if one[0] == "-"]
 
 
-@pytest.mark.parametrize("name", ["first", "two words", ""])
-def test_a_step_has_a_name_of_its_own(file: EditedFile, name: str) -> None:
-    with pytest.raises(InputError, match=r"steps\.1\.name"):
-        file.with_changes(with_added_step(file.design, {}, name, 0))
+@pytest.mark.parametrize(
+    ("words", "name"), [("second side", "second_side"), ("2. Rückseite", "step_2_Ruckseite")]
+)
+def test_a_step_gets_its_name_from_words(file: EditedFile, words: str, name: str) -> None:
+    changes = with_added_step(file.design, {}, words, 0)
+    design = file.with_changes(changes)
+    assert [*design.in_steps] == ["first", name]
+    for taken in ("first", words):
+        with pytest.raises(InputError, match="name of the step: there is a step"):
+            with_added_step(design, changes, taken, 0)
+
+
+def test_a_step_is_removed_from_the_file_or_from_the_changes(file: EditedFile) -> None:
+    """Numbers of later steps move up; the first step alone is the design without steps."""
+    three = with_added_step(file.design, {}, "turned", 0)
+    three = with_added_step(file.with_changes(three), three, "again", 1)
+    three |= {"steps.2.part.rotate_deg.0": 90.0}
+    two = without_step(file.design, three, 3, 1)
+    assert [*file.with_changes(two).in_steps] == ["first", "again"]
+    assert file.with_changes(two).in_steps["again"].part.rotate_deg[0] == 90.0
+    assert without_step(file.design, two, 2, 1) == {}
+
+    before = file.path.read_text()
+    file.save(three)
+    saved = EditedFile(file.path, False)
+    two = without_step(saved.design, {"steps.2.shot.mass_g": 1.5}, 3, 1)
+    assert saved.with_changes(two).in_steps["again"].shot.mass_g == 1.5
+    two = with_added_step(saved.with_changes(two), two, "last", 1)
+    assert [*saved.with_changes(two).in_steps] == ["first", "again", "last"]
+    one = without_step(saved.design, without_step(saved.design, two, 3, 2), 2, 1)
+    saved.save(one)
+    assert tomllib.loads(file.path.read_text()) == tomllib.loads(before)
+    with pytest.raises(InputError, match="step: given 0"):
+        without_step(saved.design, {}, 3, 0)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -150,15 +151,19 @@ def test_what_is_settled_is_taken_out_of_the_file(opened: Page) -> None:
 def test_a_step_is_added_and_shown(opened: Page) -> None:
     page = opened.page
     page.click("#new-step summary")
-    page.fill("#step-name", "turned")
+    page.fill("#step-name", "second side")
     page.click("#add-step")
-    buttons = page.locator("#step-buttons button")
+    buttons = page.locator("#step-buttons button[aria-pressed]")
     expect(buttons).to_have_count(2, timeout=WAIT)
     expect(buttons.nth(1)).to_have_attribute("aria-pressed", "true")
-    expect(buttons.nth(1)).to_contain_text("turned: ")
+    expect(buttons.nth(1)).to_contain_text("second_side: ")
     opened.put("steps.1.part.rotate_deg.0", 180)
     opened.wait("data-checked=reach")
     assert page.locator("#error").is_hidden()
+    page.get_by_role("button", name="Remove the step second_side").click()
+    expect(buttons).to_have_count(0, timeout=WAIT)
+    page.click("#undo")
+    expect(buttons).to_have_count(2, timeout=WAIT)
     page.click("#undo")
     page.click("#undo")
     expect(buttons).to_have_count(0, timeout=WAIT)
@@ -190,6 +195,11 @@ def test_a_click_picks_the_face_and_turns_it_down(opened: Page) -> None:
     expect(opened.page.locator("#chosen")).to_contain_text("faces = [")
     opened.page.mouse.move(*opened.page.evaluate(FIND, side)[1:])
     expect(opened.page.locator("#under")).to_contain_text("target, at ")
+    opened.page.get_by_role("button", name="Section").click()
+    names = "#tools > .tools", "#steps", "#under", "#legend"
+    boxes = [opened.page.locator(one).bounding_box() for one in names]
+    assert all(a["y"] + a["height"] <= b["y"] for a, b in pairwise(boxes))  # none over another
+    opened.page.get_by_role("button", name="Section").click()
     assert int(opened.page.evaluate("document.body.dataset.picked")) == side
     opened.tab("pose")
     opened.page.click("#down")
