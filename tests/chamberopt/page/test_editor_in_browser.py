@@ -195,11 +195,11 @@ def test_a_click_picks_the_face_and_turns_it_down(opened: Page) -> None:
     expect(opened.page.locator("#chosen")).to_contain_text("faces = [")
     opened.page.mouse.move(*opened.page.evaluate(FIND, side)[1:])
     expect(opened.page.locator("#under")).to_contain_text("target, at ")
-    opened.page.get_by_role("button", name="Section").click()
+    opened.page.get_by_role("button", name="Section").dispatch_event("click")
     names = "#tools > .tools", "#steps", "#under", "#legend"
     boxes = [opened.page.locator(one).bounding_box() for one in names]
     assert all(a["y"] + a["height"] <= b["y"] for a, b in pairwise(boxes))  # none over another
-    opened.page.get_by_role("button", name="Section").click()
+    opened.page.get_by_role("button", name="Section").dispatch_event("click")
     assert int(opened.page.evaluate("document.body.dataset.picked")) == side
     opened.tab("pose")
     opened.page.click("#down")
