@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,8 @@ import numpy as np
 
 from chamberopt.common.estimate import Estimate, finite_or_none
 from chamberopt.common.files import read_file
+from chamberopt.common.key_words import inner_first
+from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.documents.document import (
     Beside,
     Block,
@@ -38,6 +40,7 @@ from chamberopt.pictures.charts.study import (
 )
 from chamberopt.search.optimiser.search_model import POINTS_PER_PARAMETER
 from chamberopt.search.sensitivity import Slice
+from chamberopt.search.study.schema import Objective
 from chamberopt.search.study_folder import STUDY
 
 if TYPE_CHECKING:
@@ -83,6 +86,16 @@ def question_section(result: Result) -> Section:
     ]
     table = Table("What was varied", ("parameter", "bounds", "start", "best"), varied)
     return Section("The question", [Beside([[Sentence(text), Sentence(limits)], [table]])])
+
+
+def aim_in_words(tables: Mapping[str, Any]) -> str:
+    """Return what a study is after and what it varies, from the tables of its file."""
+    objective = tables.get("objective", {})
+    names = objective.get("pareto") or [objective.get("name", Objective().name)]
+    aims = [OBJECTIVES[one].aim for one in names if one in OBJECTIVES]
+    aim = " and ".join(aims) if aims and "sum" not in objective else "a weighted sum"
+    varied = ", ".join(map(inner_first, tables.get("vary", {})))
+    return f"{aim}; varies {varied}"
 
 
 def exposed_target(result: Result) -> str:

@@ -25,6 +25,7 @@ from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
 from chamberopt.documents.comparison import comparison_end
 from chamberopt.documents.report import answer_section
+from chamberopt.documents.study import aim_in_words
 from chamberopt.page.answers import part_answer, shape_answer, step_texts
 from chamberopt.page.checker import Checker
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
@@ -392,13 +393,17 @@ def _named_designs(file: Path) -> list[str]:
 
 
 def _files_beside(design: Path) -> list[dict[str, str]]:
-    """Return name and kind of each readable design or study file in a design's folder.
+    """Return name, kind and words of each readable design or study file in a design's folder.
 
-    The design itself comes first.
+    The words say what a study is after. The design itself comes first.
     """
     rows = []
     for path in sorted(design.parent.glob("*.toml"), key=lambda one: (one != design, one.name)):
         with suppress(InputError):
-            kind = "study" if is_study(read_toml(path, "design")[1]) else "design"
-            rows.append({"name": path.name, "kind": kind})
+            tables = read_toml(path, "design")[1]
+            with suppress(AttributeError, TypeError):  # nonsense, which is told when it is run
+                words = "this design" if path == design else "another design"
+                kind = "study" if is_study(tables) else "design"
+                words = aim_in_words(tables) if kind == "study" else words
+                rows.append({"name": path.name, "kind": kind, "words": words})
     return rows

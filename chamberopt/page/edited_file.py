@@ -148,7 +148,7 @@ class EditedFile:
         steps, document = self.design.steps or (), tomlkit.parse(self.text)
         for k in reversed(range(len(steps))):
             if k not in kept:
-                del document["steps"][k]  # type: ignore[union-attr]
+                del document["steps"][k]
         left = tuple(steps[k] for k in kept)
         if not left:
             document.pop("steps", None)

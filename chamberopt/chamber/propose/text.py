@@ -15,6 +15,7 @@ from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.proposed_mask import LeftOut
 from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.common.errors import one_line
+from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.design.almen_strip import USUAL_K, USUAL_K_LOG_SD
 from chamberopt.design.load import Design, with_paths_from
 
@@ -31,20 +32,17 @@ TARGET = "part.target"  # its reason begins with its name
 class Goal(NamedTuple):
     """What a study of `new` is after."""
 
-    words: str
     objective: str  # name of it in a study file
     meaning: str
     accuracy: str  # a further line of [search_accuracy]
 
 
 MOST_EVEN = Goal(
-    "the most even coverage after the treatment time",
     "uniform_coverage",
     "mean minus standard deviation of coverage",
     f"objective_half_width = {SEARCH_HALF_WIDTH}",
 )
 FASTEST = Goal(
-    "98 % everywhere in the shortest time",
     "minus_time_to_98_s",
     "minus the time after which 95 % of the target's area has 98 %",
     f"max_replicas = {SEARCH_REPLICAS}  # alike for all candidates, to rank them",
@@ -177,7 +175,7 @@ def study_lines(
     """
     vary = {f'"{name}"': dict(one) for name, one in bounds.items()}
     lines = [
-        f"# Searches a better chamber for the same part: {goal.words}.",
+        f"# Searches a better chamber for the same part: {OBJECTIVES[goal.objective].aim}.",
         _line("design", design),
         "",
         "[vary]  # in the units of the names",

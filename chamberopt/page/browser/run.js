@@ -1,5 +1,5 @@
 // Running the commands on what is saved, and writing a study from the sliders.
-import { ask, attempt, element, isUnsaved, say, state, read } from "./state.js";
+import { ask, attempt, element, isUnsaved, read, say, state } from "./state.js";
 import { ends, varied } from "./fields.js";
 import { bars, followed, sinceBegin } from "./steps.js";
 
@@ -8,8 +8,12 @@ const find = (id) => document.getElementById(id);
 export function fillRun() {
   const chosen = find("of").value;
   const names = state.file.files.map((one) => one.name);
-  find("of").replaceChildren(...names.map((name) => element("option", { textContent: name })));
+  find("of").replaceChildren(...state.file.files.map(({ name, words }) => element("option", { value: name, textContent: `${name}: ${words}` })));
   find("of").value = names.includes(chosen) ? chosen : state.file.file;
+  const free = (k) => `study-of-sliders${k > 1 ? `-${k}` : ""}.toml`;
+  let k = 1;
+  while (names.includes(free(k))) k += 1;
+  find("study-name").value = free(k);
   allow();
   showVaried();
 }
@@ -17,7 +21,9 @@ export function fillRun() {
 let isRunning = false;
 // A design is simulated; a study is run or swept.
 function allow() {
-  const kind = state.file.files.find((one) => one.name === find("of").value)?.kind;
+  const { kind, words } = state.file.files.find((one) => one.name === find("of").value) ?? {};
+  find("of-words").textContent = words ?? "";
+  find("search-sliders").disabled = isRunning;
   for (const button of document.querySelectorAll("[data-command]")) button.disabled = isRunning || (button.dataset.command === "simulate") !== (kind === "design");
 }
 find("of").addEventListener("change", allow);
@@ -48,6 +54,7 @@ let study = "";
 export const follow = async (started) => (await followed(show, started))?.exit ?? null;
 
 function show({ command, result, steps, seconds, lines, exit }) {
+  if (exit !== null && command.startsWith("chamberopt new ")) return; // of the front page
   const before = study;
   study = exit === null && command.startsWith("chamberopt run ") ? result : "";
   if (study && study !== before) document.dispatchEvent(new CustomEvent("running", { detail: study }));
@@ -66,7 +73,8 @@ for (const button of document.querySelectorAll("[data-command]")) button.addEven
   await followToEnd(await ask("/start", { command: button.dataset.command, of: find("of").value, points: find("points").value }));
 }));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
-find("write-study").addEventListener("click", () => attempt(async () => {
+// Write the study of the sliders, and run it.
+find("search-sliders").addEventListener("click", () => attempt(async () => {
   if (isUnsaved()) throw new Error("there are unsaved changes: the study begins from the saved design, so save or undo them first");
   const vary = Object.fromEntries([...varied].map((name) => [name, ends.get(name)]));
   const { study } = await ask("/study", { vary, name: find("study-name").value, evaluations: Number(find("evaluations").value) });
@@ -74,4 +82,5 @@ find("write-study").addEventListener("click", () => attempt(async () => {
   find("of").value = study;
   allow();
   say(`written: ${study}`, true);
+  await followToEnd(await ask("/start", { command: "run", of: study }));
 }));

@@ -219,8 +219,14 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     row.locator("input[type=checkbox]").check()
     opened.tab("run")
     page.fill("#evaluations", "2")
-    page.click("#write-study")
-    expect(page.locator("#message")).to_contain_text("written: study-of-sliders.toml")
+    page.fill("#study-name", "stopped.toml")
+    page.click("#search-sliders")
+    expect(page.locator("#message")).to_contain_text("written: stopped.toml")
+    page.click("#stop")
+    expect(page.locator("#progress")).to_contain_text("stopped", timeout=WAIT)
+    words = "the most even coverage after the treatment time; varies mass of the shot"
+    expect(page.locator("#of-words")).to_have_text(words)
+    opened.tab("run")
     page.select_option("#of", "design.toml")
     page.click("[data-command=simulate]")
     expect(page.locator("#progress")).to_contain_text("finished", timeout=WAIT)
@@ -240,8 +246,8 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
 def test_a_study_run_on_the_page_is_that_of_the_command(opened: Page) -> None:
     page, folder = opened.page, opened.served.folder
     opened.tab("run")
-    page.select_option("#of", "study-of-sliders.toml")
-    page.click("[data-command=run]")
+    expect(page.locator("#study-name")).to_have_value("study-of-sliders.toml")
+    page.click("#search-sliders")
     expect(page.locator("#progress")).to_contain_text("finished", timeout=10 * WAIT)
     out = folder / "results" / "study-by-command"  # as deep as its own: best.toml names the part
     assert main(["run", str(folder / "study-of-sliders.toml"), "--out", str(out)]) == 0
