@@ -1,4 +1,4 @@
-"""Words and units for the dotted names of numbers, in files and among facts.
+"""Words and units for the names of numbers and objectives, in files and among facts.
 
 The end of a name is its unit: "chamber.height_mm" is a "height" in "mm".
 """
@@ -13,6 +13,14 @@ UNITS = {
     "mg": "mg", "g": "g", "kg_m3": "kg/m³", "m_s": "m/s", "mm_s": "mm/s", "s": "s", "ms": "ms",
     "HB": "HB", "MPa": "MPa", "GPa": "GPa", "share": "%",
 }  # fmt: skip
+# What a study is after, by the name of its objective.
+AIMS = {
+    "uniform_coverage": "the most even coverage after the treatment time",
+    "p05_coverage": "the best coverage of the least covered places",
+    "minus_time_to_98_s": "98 % everywhere in the shortest time",
+    "minus_treatment_time_s": "the shortest treatment time that meets all limits",
+    "intensity_uniformity": "the most even peening strength",
+}
 _ITEM = re.compile(r"\.([012])$")
 _UNIT = re.compile(rf"_({'|'.join(sorted(UNITS, key=len, reverse=True))})$")
 _ALONG = re.compile(r"(?:deg|mm|axis)\.([012])$")  # along x, y and z

@@ -56,17 +56,11 @@ class Metric:
 
 @dataclass(frozen=True)
 class ObjectiveFunction:
-    """A weighted sum of metrics, and of numbers of the design, that a study maximises.
-
-    Attributes:
-        terms: weight of each metric or number, by its name.
-        aim: what a study with this objective is after, in words; "" for a sum of its own.
-    """
+    """A weighted sum of metrics, and of numbers of the design, that a study maximises."""
 
     name: str
     summary: str
-    terms: dict[str, float]
-    aim: str = ""
+    terms: dict[str, float]  # weight of each metric or number, by its name
 
     @property
     def is_exact(self) -> bool:
@@ -321,31 +315,24 @@ OBJECTIVES = {
             "uniform_coverage",  # 1 only if the whole target is covered evenly
             "mean minus standard deviation of coverage",
             {"mean_coverage": 1.0, "std_coverage": -1.0},
-            "the most even coverage after the treatment time",
         ),
         ObjectiveFunction(
-            "p05_coverage",
-            "coverage of the least covered 5 % of the area",
-            {"p05_coverage": 1.0},
-            "the best coverage of the least covered places",
+            "p05_coverage", "coverage of the least covered 5 % of the area", {"p05_coverage": 1.0}
         ),
         ObjectiveFunction(
             "minus_time_to_98_s",
             "time to full coverage, the shorter the better",
             {"time_to_98_s": -1.0},
-            "98 % everywhere in the shortest time",
         ),
         ObjectiveFunction(
             "minus_treatment_time_s",
             "treatment time that meets all limits, the shorter the better",
             {"process.treatment_time_s": -1.0},
-            "the shortest treatment time that meets all limits",
         ),
         ObjectiveFunction(
             "intensity_uniformity",
             "how even the peening strength is over the target",
             {"intensity_uniformity": 1.0},
-            "the most even peening strength",
         ),
     )
 }

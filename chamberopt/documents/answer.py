@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from chamberopt.chamber.checks.calibration import misfit_texts
+from chamberopt.common.estimate import Estimate
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.documents.coverage import change
@@ -36,7 +37,7 @@ def answer(result: Result, start: Result | None) -> str:
     """Return the answer of a result in one sentence, with its uncertainty.
 
     For a study, the sentence gives the objective of the start design and of the best design, and
-    whether the change is more than noise. For a simulation, the sentence gives the coverage.
+    whether the change is useful, and more than noise. For a simulation, the sentence gives the coverage.
     """
     label = objective_label(result.objective_name)
     if start is None:
@@ -70,6 +71,12 @@ def answer(result: Result, start: Result | None) -> str:
     gain = change(result.objective, start.objective, result, start)
     gained = label.format(gain, sign=True)
     intervals = "(95 % intervals, both simulated again with fresh seeds)"
+    if study is not None and study.keeps_start:
+        counts = label.format(Estimate(abs(study.counts), 0.0)).removeprefix("−")
+        return (
+            f"No useful difference: keep the start. The {named} goes {values}, a change of "
+            f"{gained} {intervals}; less than {counts} does not count."
+        )
     if gain.low > 0.0:
         return (
             f"The best chamber found changes the {named} {values}: a change of {gained} "

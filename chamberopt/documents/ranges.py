@@ -105,7 +105,8 @@ def range_answer(result: Result) -> Iterator[AnswerLine]:
         else:
             text += f"is as above: {_narrowed(figure)}."
         yield AnswerLine("ranges", text, False)
-    for one in result.study.at_ends if result.study else ():
+    study = result.study
+    for one in study.at_ends if study and not study.keeps_start else ():
         yield AnswerLine("ranges", at_ends_text(one), any(x.gain.low <= 0.0 for x in one.gains))
 
 

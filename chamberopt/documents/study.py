@@ -12,8 +12,7 @@ import numpy as np
 
 from chamberopt.common.estimate import Estimate, finite_or_none
 from chamberopt.common.files import read_file
-from chamberopt.common.key_words import inner_first
-from chamberopt.coverage.metrics import OBJECTIVES
+from chamberopt.common.key_words import AIMS, inner_first
 from chamberopt.documents.document import (
     Beside,
     Block,
@@ -92,7 +91,7 @@ def aim_in_words(tables: Mapping[str, Any]) -> str:
     """Return what a study is after and what it varies, from the tables of its file."""
     objective = tables.get("objective", {})
     names = objective.get("pareto") or [objective.get("name", Objective().name)]
-    aims = [OBJECTIVES[one].aim for one in names if one in OBJECTIVES]
+    aims = [AIMS[one] for one in names if one in AIMS]
     aim = " and ".join(aims) if aims and "sum" not in objective else "a weighted sum"
     varied = ", ".join(map(inner_first, tables.get("vary", {})))
     return f"{aim}; varies {varied}"

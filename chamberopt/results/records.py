@@ -352,6 +352,12 @@ class StudyRecord(Table):
     seconds: Positive
 
     @property
+    def keeps_start(self) -> bool:
+        """Whether the best design is the start, or surely gains less than counts."""
+        is_start = self.best.parameters == self.start.parameters
+        return is_start or max(self.gain.high, 0.0) < self.counts
+
+    @property
     def on_bounds(self) -> list[str]:
         """Names of the parameters whose value in the best design lies on a bound of the search."""
         return [

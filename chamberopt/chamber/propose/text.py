@@ -15,7 +15,7 @@ from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.proposed_mask import LeftOut
 from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.common.errors import one_line
-from chamberopt.coverage.metrics import OBJECTIVES
+from chamberopt.common.key_words import AIMS
 from chamberopt.design.almen_strip import USUAL_K, USUAL_K_LOG_SD
 from chamberopt.design.load import Design, with_paths_from
 
@@ -175,7 +175,7 @@ def study_lines(
     """
     vary = {f'"{name}"': dict(one) for name, one in bounds.items()}
     lines = [
-        f"# Searches a better chamber for the same part: {OBJECTIVES[goal.objective].aim}.",
+        f"# Searches a better chamber for the same part: {AIMS[goal.objective]}.",
         _line("design", design),
         "",
         "[vary]  # in the units of the names",

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.key_words import AIMS
 from chamberopt.coverage.metrics import (
     METRICS,
     NEVER,
@@ -118,6 +119,7 @@ def test_a_study_may_use_all_objectives_of_the_registry() -> None:
     for name, objective in OBJECTIVES.items():
         assert study.Objective(name=name).name == name
         assert all(term in METRICS or is_number(term) for term in objective.terms)
+        assert name in AIMS
     with pytest.raises(InputError, match="uniform_coverage"):
         parse_objective("shiny")
 

@@ -34,6 +34,8 @@ def a_study(model: ModelRecord | None = None, **other: object) -> StudyRecord:
         "best": BestRecord(parameters={"x": 0.0}),
         "model": model,
         "confirmed": [],
+        "gain": Estimate(0.3, 0.1),
+        "counts": 0.0,
     }
     return StudyRecord.model_construct(**values | other)
 
@@ -161,6 +163,21 @@ def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
         "large, as intervals have them: look at the picture of the calibration.",
     ]
     assert [one.warns for one in lines] == [True, False, True, True, True, True]
+
+
+@pytest.mark.parametrize(("counts", "keeps"), [(30.0, True), (5.0, False)])
+def test_a_gain_that_does_not_count_keeps_the_start(counts: float, keeps: bool) -> None:
+    """Objectives are minus times, of which a start of 530 s and a best of 520 s."""
+    study = a_study(counts=counts, gain=Estimate(10.0, 2.0))
+    start, result = (
+        SimpleNamespace(
+            objective_name="minus_time_to_98_s", objective=one, study=study, seeds=seeds
+        )
+        for one, seeds in ((Estimate(-530.0, 1.0), [1]), (Estimate(-520.0, 1.0), [2]))
+    )
+    said = answer(result, start)  # type: ignore[arg-type]
+    assert said.startswith("No useful difference: keep the start. ") == keeps
+    assert ("; less than 30 s does not count." in said) == keeps
 
 
 def test_what_is_not_resolved_is_not_in_the_answer_as_a_number() -> None:
