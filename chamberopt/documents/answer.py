@@ -37,7 +37,8 @@ def answer(result: Result, start: Result | None) -> str:
     """Return the answer of a result in one sentence, with its uncertainty.
 
     For a study, the sentence gives the objective of the start design and of the best design, and
-    whether the change is useful, and more than noise. For a simulation, the sentence gives the coverage.
+    whether the change is useful, and more than noise. For a simulation, the sentence gives the
+    coverage.
     """
     label = objective_label(result.objective_name)
     if start is None:
