@@ -18,7 +18,7 @@ from chamberopt.chamber.bores_and_deflectors import on_deflectors
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.geometry.triangles import border_edges
 from chamberopt.pictures.charts.colours import EDGES
-from chamberopt.pictures.drawn_part import DrawnPart, point_areas
+from chamberopt.pictures.drawn_part import DrawnPart, colour_range, point_areas
 from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.load import Result
@@ -95,6 +95,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
     is_closed = not len(border_edges(arrays.chamber.part.triangles))  # or drawn as a piece
     data = {
         "title": title,
+        "limits": colour_range([part]),  # of coverage after the treatment time, as in pictures
         "treatment": result.design.process.treatment_time,
         "curve": [
             [row.time_s, row.mean_coverage, row.half_width]

@@ -31,9 +31,13 @@ function showParts({ quantities, scenes, scales, kinds }) {
     return moves() ? scene.columns.density.map((d) => covered(d, scene)) : scene.columns[chosen().name];
   }
 
-  // Range of the colours: 1st to 99th percentile of all results, widened to round numbers.
+  // Range of the colours: of coverage that of the pictures at the treatment time, and all at another time; if fitted, and
+  // of what is no share, 1st to 99th percentile of all results, widened to round numbers.
   function range(all) {
-    if (chosen().unit === "%" && !controls.fit.checked) return [0, 100];
+    if (chosen().unit === "%" && !controls.fit.checked) {
+      const isTreated = scenes.every(({ treatment }) => Math.abs(seconds() - treatment) < 1e-3 * treatment);
+      return moves() && isTreated ? [0, 1].map((k) => Math[k ? "max" : "min"](...scenes.map(({ limits }) => limits[k]))) : [0, 100];
+    }
     const known = Float32Array.from(all.flatMap((one) => Array.from(one.filter(Number.isFinite)))).sort();
     if (!known.length) return [0, 1];
     const at = (share) => known[Math.round(share * (known.length - 1))];

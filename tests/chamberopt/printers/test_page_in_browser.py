@@ -1,6 +1,7 @@
 """The page in a real browser without a display: it draws, reacts, and fetches nothing."""
 
 import io
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -94,9 +95,14 @@ def test_another_quantity_has_its_own_bar(shown: OpenPage) -> None:
 
 def test_the_slider_shows_coverage_at_other_times(shown: OpenPage) -> None:
     before = shown.pixels()
-    slider = shown.page.locator("#time")
+    slider, ticks = shown.page.locator("#time"), shown.page.locator("#part-0 .bar em")
+    data = json.loads(shown.page.locator("#parts").text_content())
+    ends = data["scenes"][0]["limits"]  # those of the picture beside the page
+    assert [float(one) for one in ticks.all_text_contents()][::4] == ends[::-1]
     slider.focus()
     slider.press("Home")
+    expect(ticks.last).to_have_text("0")
+    expect(ticks.first).to_have_text("100")
     begun = "0 s: the target is covered to 0.0 %"
     expect(shown.page.locator("#at")).to_contain_text(begun)
     after = shown.pixels()
