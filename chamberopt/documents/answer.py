@@ -89,6 +89,12 @@ def answer(result: Result, start: Result | None) -> str:
     )
 
 
+def on_average(result: Result) -> str:
+    """Return a line on a result: the time to 98 %, and the mean coverage."""
+    mean = metric_label("mean_coverage").format(result.metrics["mean_coverage"])
+    return f"{full_coverage(result)}; covered to {mean} on average"
+
+
 def answer_lines(result: Result) -> list[AnswerLine]:
     """Return sentences that qualify the answer.
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from itertools import count, product
+from itertools import count, islice, product
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +20,15 @@ from chamberopt.common.files import (
     remove_file,
     write_text,
 )
+from chamberopt.common.key_words import inner_first, unit_of
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
+from chamberopt.documents.answer import on_average
 from chamberopt.documents.comparison import comparison_end
 from chamberopt.documents.report import answer_section
 from chamberopt.documents.study import aim_in_words
+from chamberopt.documents.wording import plain
 from chamberopt.page.answers import part_answer, shape_answer, step_texts
 from chamberopt.page.checker import Checker
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
@@ -46,20 +49,24 @@ from chamberopt.printers.html import section
 from chamberopt.printers.report_page import REPORT, parts_content, viewer
 from chamberopt.printers.sheet_page import SHEET
 from chamberopt.results.compare.comparison import compare
-from chamberopt.results.load import load_result, load_start, summary
+from chamberopt.results.load import load_result, load_start
 from chamberopt.search.study import load_study
 from chamberopt.search.study_folder import STUDY, is_finished, is_study_folder, read_inputs
 
+MOST_NUMBERS = 6  # by which results differ, in the line of each
 DEEPEST = 4  # levels of folders below the design's folder that are searched for results
 
 
 def list_results(folder: Path) -> list[dict[str, object]]:
-    """List all results and studies below a folder, the newest first, with figures in a line."""
+    """List all results and studies below a folder, the newest first.
+
+    Each has a line on its coverage, and on the numbers of its design by which the results differ.
+    """
     found: dict[Path, float] = {}
     for depth, name in product(range(1, DEEPEST + 1), (INPUTS, RESULT)):
         for file in folder.glob("/".join(["*"] * depth + [name])):
             found[file.parent] = max(found.get(file.parent, 0.0), file.lstat().st_mtime)
-    rows = []
+    rows, designs = [], {}
     for where in sorted(found, key=lambda one: found[one], reverse=True):
         if not where.resolve().is_relative_to(folder):
             continue  # a link to elsewhere
@@ -67,13 +74,41 @@ def list_results(folder: Path) -> list[dict[str, object]]:
         row |= {name: (where / name).is_file() for name in (REPORT, SHEET)}
         row["is_study"] = is_study_folder(where)
         try:
-            row["text"] = summary(load_result(where))
+            result = load_result(where)
+            designs[row["folder"]] = _numbers(result.design)
+            row["text"] = on_average(result)
         except InputError as error:
             unfinished = row["is_study"] and not is_finished(where)
             row["text"] = "a study that has not finished" if unfinished else str(error)
             row["unusable"] = True
         rows.append(row)
+    differing = _differing([*designs.values()])
+    for row in rows:
+        own = designs.get(row["folder"], {})
+        words = [
+            f"{inner_first(name)} {f'{plain(own[name])} {unit_of(name)}'.rstrip()}"
+            for name in differing
+            if name in own
+        ]
+        row["text"] = "; ".join([", ".join(words)] * bool(words) + [row["text"]])
     return rows
+
+
+def _numbers(design: Design) -> dict[str, float]:
+    """Return the numbers that a design has by their dotted names, but for its accuracy."""
+    found = {}
+    for name in design.numbers():
+        if not name.startswith("process.accuracy."):
+            with suppress(InputError):  # one that is not set
+                found[name] = design.value(name)
+    return found
+
+
+def _differing(designs: Sequence[Mapping[str, float]]) -> list[str]:
+    """Return the first names of numbers that are not the same in all designs."""
+    names = dict.fromkeys(name for one in designs for name in one)
+    found = (name for name in names if len({one.get(name) for one in designs}) > 1)
+    return [*islice(found, MOST_NUMBERS)]
 
 
 def shown(folders: Sequence[Path]) -> dict[str, object]:

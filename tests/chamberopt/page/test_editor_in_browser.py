@@ -235,6 +235,7 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     assert main(["simulate", str(folder / "design.toml"), "--no-ranges", "--out", str(out)]) == 0
     assert result["metrics"] == json.loads((out / "result.json").read_text())["metrics"]
     opened.tab("results")
+    expect(page.locator("#result-list small", has_text="on average")).to_have_count(1)
     page.locator("#result-list input").first.check()
     page.click("#show-results")
     opened.wait("data-drawn=yes")
@@ -249,6 +250,8 @@ def test_a_study_run_on_the_page_is_that_of_the_command(opened: Page) -> None:
     expect(page.locator("#study-name")).to_have_value("study-of-sliders.toml")
     page.click("#search-sliders")
     expect(page.locator("#progress")).to_contain_text("finished", timeout=10 * WAIT)
+    lines = page.locator("#result-list small")
+    expect(lines.filter(has_text="mass of the shot")).not_to_have_count(0)  # what was varied
     out = folder / "results" / "study-by-command"  # as deep as its own: best.toml names the part
     assert main(["run", str(folder / "study-of-sliders.toml"), "--out", str(out)]) == 0
     own = folder / "results" / "study-of-sliders"
