@@ -11,7 +11,7 @@ import numpy as np
 
 from chamberopt.chamber.fixture import size_in_words
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.key_words import in_words, unit_of
+from chamberopt.common.key_words import in_words, title_with_unit, unit_of
 from chamberopt.common.number_text import estimate_text, percent
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.calibration import why_no_intensity
@@ -525,7 +525,8 @@ def _tolerances(result: Result) -> Iterator[Row]:
     """
     box = tolerance_box(result.design)
     for name, (low, high) in box.items():
-        yield name, f"{plain(low)} to {plain(high)}, as designed {plain(result.design.value(name))}"
+        designed = plain(result.design.value(name))
+        yield title_with_unit(name), f"{plain(low)} to {plain(high)}, as designed {designed}"
     found = result.record.tolerances
     if result.design.tolerances is None:
         low, high = (_peak_to_valley(result) + sign * USUAL["amplitude_pv_um"] for sign in (-1, 1))

@@ -246,8 +246,8 @@ def influence_section(study: StudyRecord, label: Label) -> Section:
             for row in rows
         ]
         caption = (
-            "Each parameter alone. Band: 95 % interval of the model; without one: as bad or worse. "
-            "Shaded range: no more than the noise is lost. Above: how much of the variance over "
+            "Each parameter alone. Band: 95 % interval of the model; nothing is drawn where "
+            "evaluations leave it an upper limit alone. Shaded range: no more than the noise is lost. Above: how much of the variance over "
             "the bounds is that of the dashed line; what is missing to 100 % is how parameters act "
             "together."
         )

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
+from chamberopt.common.key_words import title_with_unit
 from chamberopt.common.number_text import estimate_text
 from chamberopt.common.number_text import plain as ascii_number
 from chamberopt.documents.document import Block, Chart, Items, Section, Sentence, Table
@@ -79,7 +80,7 @@ def tolerance_section(result: Result) -> Section | None:
         ("", "low", "as designed", "high", "worst corner"),
         [
             (
-                name,
+                title_with_unit(name),
                 *map(plain, (one.low, one.nominal, one.high)),
                 plain(found.corner[name]) if found.corner else "",
             )
@@ -110,7 +111,7 @@ def tolerance_section(result: Result) -> Section | None:
 
 def _panel(label: Label, figure: ToleratedFigure) -> TornadoPanel:
     bars = {
-        name: TornadoBar(name, label.scale(ends.low), label.scale(ends.high))
+        name: TornadoBar(title_with_unit(name), label.scale(ends.low), label.scale(ends.high))
         for name, ends in figure.effects.items()
     }
     return TornadoPanel(label.text, Label("change", label.unit).with_unit, bars)

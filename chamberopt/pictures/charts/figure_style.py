@@ -106,11 +106,9 @@ def value_range(estimates: Sequence[Estimate]) -> tuple[float, float]:
     """
     values = np.array([one.value for one in estimates])
     half_widths = np.array([one.half_width for one in estimates])
+    half_widths[~np.isfinite(half_widths)] = 0.0  # which have no bars
     span = float(np.ptp(values))
-    if span > 0.0:
-        shown = np.minimum(half_widths, span)
-    else:
-        shown = np.where(np.isfinite(half_widths), half_widths, 0.0)
+    shown = np.minimum(half_widths, span) if span > 0.0 else half_widths
     low, high = float((values - shown).min()), float((values + shown).max())
     margin = 0.05 * (high - low) or 0.5
     return low - margin, high + margin

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.estimate import Estimate
+from chamberopt.common.key_words import title_with_unit
 from chamberopt.common.number_text import estimate_text, plain
 from chamberopt.pictures.charts.colours import BLUE, GREEN, GREY, ORANGE
 from chamberopt.pictures.charts.figure_style import (
     SMALL,
     TITLE,
+    literal,
     name_choices,
     new_figure,
     readable,
@@ -74,7 +76,7 @@ def convergence_picture(path: Path, result: StudyResult) -> None:
     axes.axhline(start.value, color=ORANGE, lw=1.2, ls="--", label="start, as confirmed")
     axes.set_title(
         f"best {estimate_text(best)}, start {estimate_text(start)}: "
-        f"gain {estimate_text(result.gain, sign=True)}   ({result.algorithm})",
+        f"gain {estimate_text(result.gain, sign=True)}",
         loc="left",
         fontsize=TITLE,
     )
@@ -204,7 +206,7 @@ def _draw_parameter(
     margin = (0.2 if varied.texts else 0.03) * (high - low)
     axes.set_xlim(low - margin, high + margin)
     name_choices(axes.xaxis, varied.texts)
-    style_axes(axes, name)
+    style_axes(axes, literal(title_with_unit(name)))
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=SMALL, frameon=False)
 
@@ -239,7 +241,8 @@ def slices_figure(
     """Return charts of the objective over each parameter, as the study's model predicts it.
 
     Each chart varies a parameter of the best design. It shows the interval of the prediction, the
-    mean over the other parameters, and the range in which the objective is hardly worse.
+    mean over the other parameters, and the range in which the objective is hardly worse. It shows
+    nothing where the evaluations leave the model no more than an upper limit.
 
     Args:
         slices: predictions over each parameter.
@@ -251,36 +254,38 @@ def slices_figure(
     figure = new_figure(3.4 * max(columns, 2), 3.3 * rows + 0.5)
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     for axes, one in zip(panels, slices, strict=False):
-        of_slice = "the others as in the best, 95 % interval; without a band: or worse"
-        width = np.where(one.or_worse, np.nan, one.half_width)  # no band for bounds
-        of_mean = "mean over the others; above, its share of the variance over the bounds"
+        of_slice, of_mean = "model, the others as in the best", "mean over the others"
+        # The model takes evaluations below its floor as its floor: there it is an upper limit.
+        mean, effect = (np.where(one.or_worse, np.nan, x) for x in (one.mean, one.effect))
+        width = one.half_width
         if one.texts:
             for text in one.flat:
                 place = _place(one, text)
                 axes.axvspan(
                     place - 0.2, place + 0.2, color=GREEN, alpha=0.12, lw=0, label=flat_label
                 )
-            axes.errorbar(one.values, one.mean, width, fmt="o", color=BLUE, label=of_slice)
-            axes.plot(one.values, one.effect, "D", mfc="none", color=GREY, label=of_mean)
+            axes.errorbar(one.values, mean, width, fmt="o", color=BLUE, label=of_slice)
+            axes.plot(one.values, effect, "D", mfc="none", color=GREY, label=of_mean)
             name_choices(axes.xaxis, one.texts)
         else:
-            low, high = one.mean - width, one.mean + width
+            low, high = mean - width, mean + width
             axes.axvspan(*one.flat, color=GREEN, alpha=0.12, lw=0, label=flat_label)
             axes.fill_between(one.values, low, high, color=BLUE, alpha=0.15, lw=0)
-            axes.plot(one.values, one.mean, color=BLUE, label=of_slice)
-            axes.plot(one.values, one.effect, color=GREY, ls="--", label=of_mean)
+            axes.plot(one.values, mean, color=BLUE, label=of_slice)
+            axes.set_xlim(one.values.min(), one.values.max())  # also where nothing is drawn
+            axes.plot(one.values, effect, color=GREY, ls="--", label=of_mean)
         axes.axvline(_place(one, best[one.name]), color=GREEN, lw=1.2, label="best")
         if is_there(start[one.name], one.texts):
             axes.axvline(_place(one, start[one.name]), color=ORANGE, lw=1.0, ls=":", label="start")
         axes.set_title(f"alone {one.share:.0%} of the variance", loc="left", fontsize=SMALL)
-        style_axes(axes, one.name)
+        style_axes(axes, literal(title_with_unit(one.name)))
     for axes in panels[len(slices) :]:
         axes.set_visible(False)
     panels[0].set_ylabel(y_label)
     found = [axes.get_legend_handles_labels() for axes in panels[: len(slices)]]
     legend = {label: one for pair in found for one, label in zip(*pair, strict=True)}
     figure.legend(legend.values(), legend.keys(), loc="outside upper center",
-                  ncols=2 if columns > 2 else 1, fontsize=SMALL, frameon=False)  # fmt: skip
+                  ncols=5 if columns > 2 else 2, fontsize=SMALL, frameon=False)  # fmt: skip
     return figure
 
 
