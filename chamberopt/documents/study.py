@@ -247,9 +247,9 @@ def influence_section(study: StudyRecord, label: Label) -> Section:
         ]
         caption = (
             "Each parameter alone. Band: 95 % interval of the model; nothing is drawn where "
-            "evaluations leave it an upper limit alone. Shaded range: no more than the noise is lost. Above: how much of the variance over "
-            "the bounds is that of the dashed line; what is missing to 100 % is how parameters act "
-            "together."
+            "evaluations leave it an upper limit alone. Shaded range: no more than the noise is "
+            "lost. Above: how much of the variance over the bounds is that of the dashed line; "
+            "what is missing to 100 % is how parameters act together."
         )
         figure = influence_figure(
             [row.curve for row in rows],
