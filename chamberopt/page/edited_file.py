@@ -232,8 +232,9 @@ class EditedFile:
             if last in table:
                 del table[last]
         elif name == TO_SETTLE:
-            for one in [one for one in table[last] if one not in value]:
-                table[last].remove(one)
+            for k in reversed(range(len(table[last]))):
+                if table[last][k] not in value:
+                    del table[last][k]
         elif not isinstance(table, list):
             table[last] = _inline(value)
         elif int(last) < len(table):
