@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from chamberopt.chamber.part import preview_part
-from chamberopt.chamber.propose.text import study_lines
+from chamberopt.chamber.propose.text import study_of_design
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import (
     INPUTS,
@@ -258,7 +258,8 @@ class Acts:
         if not bounds:
             raise InputError("nothing varies: tick the numbers that the search may change")
         start = {key: f"now {file.design.value(key):g}" for key in bounds}
-        write_text(path, study_lines(file.path.name, bounds, start, int(evaluations)))
+        asked_for = file.design, bounds, start, int(evaluations)
+        write_text(path, study_of_design(file.path.name, *asked_for))
         try:
             load_study(path)
         except InputError:

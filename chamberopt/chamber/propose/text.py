@@ -156,6 +156,28 @@ def study_texts(proposal: Proposal, design: str) -> dict[str, str]:
     return {"study.toml": text(FASTEST, proposal.search_time), "most_even.toml": short + even}
 
 
+def study_of_design(
+    name: str,
+    design: Design,
+    bounds: Mapping[str, Mapping[str, Any]],
+    notes: Mapping[str, str],
+    evaluations: int,
+) -> str:
+    """Return the text of a study file that varies numbers of any design.
+
+    It is after the shortest time: after the treatment time nearly all good chambers are even. For a
+    design with steps it is after the most even coverage. A candidate is simulated for as long as
+    the design.
+
+    Args:
+        name, bounds, notes, evaluations: as of `study_lines`, of which `name` is its `design`.
+    """
+    accuracy = design.process.accuracy
+    each = accuracy.replicas * accuracy.simulated_time / SEARCH_REPLICAS
+    goal = MOST_EVEN if design.steps else FASTEST
+    return study_lines(name, bounds, notes, evaluations, goal, each)
+
+
 def study_lines(
     design: str,
     bounds: Mapping[str, Mapping[str, Any]],

@@ -224,7 +224,7 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     expect(page.locator("#message")).to_contain_text("written: stopped.toml")
     page.click("#stop")
     expect(page.locator("#progress")).to_contain_text("stopped", timeout=WAIT)
-    words = "the most even coverage after the treatment time; varies mass of the shot"
+    words = "98 % everywhere in the shortest time; varies mass of the shot"
     expect(page.locator("#of-words")).to_have_text(words)
     opened.tab("run")
     page.select_option("#of", "design.toml")
