@@ -99,7 +99,7 @@ def propose_intensity(
             one = one or again(replace(wanted, ball_mm=chosen.ball_mm))
         except InputError:  # no chamber with these balls
             settings = [one for one in settings if one.ball_mm != chosen.ball_mm]
-            chosen = choose(intensity, settings, _values(found))
+            chosen = choose(intensity, settings, _values(found), possible.served)
             continue
         by_ball[chosen.ball_mm] = one
         one = with_amplitude(one, chosen)
@@ -107,7 +107,7 @@ def propose_intensity(
             settings = [setting_of(one), *(x for x in settings if x != chosen)]
             chosen = setting_of(one)
             if chosen in found:
-                chosen = choose(intensity, settings, _values(found))
+                chosen = choose(intensity, settings, _values(found), possible.served)
                 continue
         predicted, pilots = simulate(one), pilots + 1
         if predicted is None:
@@ -121,7 +121,7 @@ def propose_intensity(
             if all(intensity.off(expected_intensity(x, simulated)) < 0.0 for x in settings):
                 settings, larger = [*settings, *larger], []
         left = settings if pilots < MOST_PILOTS else [*found]
-        chosen = choose(intensity, left, _values(found))
+        chosen = choose(intensity, left, _values(found), possible.served)
     one = by_ball[chosen.ball_mm]
     if chosen in possible.larger:
         reason = _of_larger(chosen, setting_of(made).ball_mm, possible, _values(found))

@@ -34,6 +34,7 @@ from chamberopt.design.intensity import WantedIntensity
 BALL_POWER, AMPLITUDE_POWER = 1.0, 0.9
 # Settings in the middle half of the range, by logarithms, count as equally good.
 MIDDLE = 0.5
+ALIKE = 0.02  # share of the target within which sizes in the range serve alike
 
 
 class Setting(NamedTuple):
@@ -117,22 +118,33 @@ def _ratio(setting: Setting, other: Setting) -> float:
 
 
 def choose(
-    wanted: WantedIntensity, settings: Sequence[Setting], simulated: Mapping[Setting, float]
+    wanted: WantedIntensity,
+    settings: Sequence[Setting],
+    simulated: Mapping[Setting, float],
+    served: Mapping[float, float] | None = None,
 ) -> Setting:
     """Return the setting for an intensity: of the largest amplitude in the middle of the range.
 
-    The same intensity takes the less time the larger the amplitude, with smaller balls. Where no
-    setting is in the middle half of the range, it is the one nearest to the middle.
+    The same intensity takes the less time the larger the amplitude, with smaller balls. Where balls
+    elsewhere in the range serve more of the target, these are taken: an intensity is known to a
+    factor, and what no ball touches stays bare. Where no setting is in the middle half of the
+    range, it is the one nearest to the middle.
+
+    Args:
+        served: share of the target that each size serves, by diameter [mm]; all of it by default.
     """
     off = {
         one: abs(math.log(max(expected_intensity(one, simulated), 1e-9) / wanted.middle))
         for one in settings
     }
     half = 0.5 * MIDDLE * math.log(wanted.high / wanted.low)
-    middle = [one for one in settings if off[one] <= half]
+    inside = [one for one in settings if not wanted.off(expected_intensity(one, simulated))]
+    shares = {one: (served or {}).get(one.ball_mm, 1.0) for one in inside}
+    best = [one for one in inside if shares[one] >= max(shares.values()) - ALIKE]
+    middle = [one for one in best if off[one] <= half]
     if middle:
         return max(middle, key=lambda one: (one.amplitude_um, -off[one]))
-    return min(settings, key=lambda one: off[one])
+    return min(best or settings, key=lambda one: off[one])
 
 
 def with_amplitude(made: Proposal, setting: Setting) -> Proposal:

@@ -69,6 +69,18 @@ def test_of_settings_in_the_middle_the_largest_amplitude_is_chosen() -> None:
     assert choose(WantedIntensity(0.28, 0.32), SETTINGS, simulated) == Setting(1.5, 40.0)
 
 
+def test_in_the_range_balls_that_serve_more_are_chosen() -> None:
+    """Though they give an intensity at its edge. What serves hardly more does not count."""
+    simulated = {one: one.ball_mm * one.amplitude_um / 200.0 for one in SETTINGS}
+    wanted = WantedIntensity(0.2, 0.32)
+    assert choose(wanted, SETTINGS, simulated).ball_mm == 1.5
+    for gain, ball in ((0.05, 1.0), (0.01, 1.5)):
+        served = {one.ball_mm: 0.8 + gain * (one.ball_mm < 1.5) for one in SETTINGS}
+        assert choose(wanted, SETTINGS, simulated, served).ball_mm == ball
+    too_strong = WantedIntensity(0.5, 0.6)
+    assert choose(too_strong, SETTINGS, simulated, {1.0: 1.0, 3.0: 0.5}).ball_mm > 2.0
+
+
 @pytest.mark.parametrize(
     ("wanted", "nearest"), [((0.8, 0.9), Setting(3.0, 40.0)), ((0.03, 0.05), Setting(1.0, 20.0))]
 )
