@@ -142,7 +142,7 @@ def test_a_calibrated_mix_with_zones_and_tolerances(folder: Path) -> None:
         result.metrics[f"z{k}.p05_coverage"] = intensity
     rows = rows_of(result)
     assert len(re.findall(r"of Ø [23] mm, [\d.]+ g", rows["Shot"]["balls"])) == 2
-    assert rows["Tolerances"]["sonotrode.amplitude_um"] == "23 to 27, as designed 25"
+    assert rows["Tolerances"]["Sonotrode amplitude [µm]"] == "23 to 27, as designed 25"
     assert "was not simulated" in rows["Tolerances"][""]
     zones = rows["Zones and limits"][""]
     assert (zones.count("is not met"), zones.count("is met")) == (3, 3)

@@ -62,7 +62,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_report_has_a_section_and_a_chart(folder: Path, tmp_path: Path) -> None:
     (section,) = (one for one in report(load_result(folder)).sections if one.title == "Tolerances")
     _, ranges, figures, *_ = section.content
-    assert [row[0] for row in ranges.rows] == ["sonotrode.amplitude_um", "shot.mass_g"]
+    assert [row[0] for row in ranges.rows] == ["Sonotrode amplitude [µm]", "Shot mass [g]"]
     assert figures.rows[0][0] == "coverage that 95 % of the area exceeds [%]"
     page = write_report(folder, tmp_path / "page.html")[0].read_text(encoding="utf-8")
     for text in ("<h2>Tolerances</h2>", 'id="tolerances"', "27 to 30 whole balls"):
