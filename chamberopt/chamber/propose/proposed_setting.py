@@ -34,7 +34,7 @@ from chamberopt.design.intensity import WantedIntensity
 BALL_POWER, AMPLITUDE_POWER = 1.0, 0.9
 # Settings in the middle half of the range, by logarithms, count as equally good.
 MIDDLE = 0.5
-ALIKE = 0.02  # share of the target within which sizes in the range serve alike
+ALIKE = 0.01  # share of the target within which sizes in the range serve alike
 
 
 class Setting(NamedTuple):

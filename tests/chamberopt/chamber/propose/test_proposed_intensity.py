@@ -74,7 +74,7 @@ def test_in_the_range_balls_that_serve_more_are_chosen() -> None:
     simulated = {one: one.ball_mm * one.amplitude_um / 200.0 for one in SETTINGS}
     wanted = WantedIntensity(0.2, 0.32)
     assert choose(wanted, SETTINGS, simulated).ball_mm == 1.5
-    for gain, ball in ((0.05, 1.0), (0.01, 1.5)):
+    for gain, ball in ((0.05, 1.0), (0.005, 1.5)):
         served = {one.ball_mm: 0.8 + gain * (one.ball_mm < 1.5) for one in SETTINGS}
         assert choose(wanted, SETTINGS, simulated, served).ball_mm == ball
     too_strong = WantedIntensity(0.5, 0.6)
