@@ -129,9 +129,12 @@ def check_answers(design: Design, step: int = 0) -> Iterator[bytes]:
     found = describe(design, whole)
     share = reached_part_share(reach, chamber.source, len(part.triangles))
     state[part.target & (chamber.exposed_area > 0.0) & (share <= 0.5)] = MISSED
-    said = [on_page(text) for text in found["notes"]], _warnings(design, found["warnings"])
-    head = dict(zip(("notes", "warnings"), said, strict=True))
-    yield packed({"facts": _facts(design, found), **head}, state=state)
+    head = {
+        "facts": _facts(design, found),
+        "notes": [on_page(text) for text in found["notes"]],
+        "warnings": _warnings(design, found["warnings"]),
+    }
+    yield packed(head, state=state)
 
 
 def _warnings(design: Design, texts: Sequence[str]) -> list[Words]:
