@@ -137,6 +137,8 @@ TIME = "time_to_98_s"
 # The number of replicas says more than the rule by which it was chosen.
 REPLICAS = "process.accuracy.replicas"
 STOPPING_RULES = ("process.accuracy.objective_half_width", "process.accuracy.max_replicas")
+# Values of a design that make no other chamber or process.
+NOT_COMPARED: dict[str, Any] = {"part": {"mesh", "unit"}, "to_settle": True}
 
 
 @dataclass(frozen=True)
@@ -287,7 +289,7 @@ def _design_values(result: Result) -> dict[str, Any]:
     Three values are added from the result: the number of replicas, the digest of a custom shape,
     and whether the cavity is analytical.
     """
-    values = _flattened(result.design.model_dump(mode="json", exclude={"part": {"mesh", "unit"}}))
+    values = _flattened(result.design.model_dump(mode="json", exclude=NOT_COMPARED))
     for name in STOPPING_RULES:
         values.pop(name, None)
     if is_custom(values["chamber.shape"]):
