@@ -75,7 +75,7 @@ from chamberopt.chamber.propose.proposed_target import (
     shape_for,
     surfaces,
 )
-from chamberopt.chamber.propose.shop import Shop, usual_shop
+from chamberopt.chamber.propose.shop import HARD, STEEL, Shop, usual_shop
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import step
 from chamberopt.common.toml_fields import MAX_COORDINATE_MM
@@ -93,9 +93,9 @@ AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is t
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
 # Balls for aluminium and for an alloy of implants, which a word of its name tells.
 CERAMIC, IMPLANT = "zirconia", "ELI"
-# Materials of balls, and least hardness of steel balls over the part's. A part as hard as they are
-# is hardly dented: in pilots of a gear of 650 HB tungsten carbide left 9 times the dents.
-STEEL, HARD, HARDER = "steel", "tungsten_carbide", 1.25
+# Least hardness of steel balls over the part's. A part as hard as they are is hardly dented: in
+# pilots of a gear of 650 HB tungsten carbide left 9 times the dents.
+HARDER = 1.25
 # By metal of the part. Of aluminium: SAE AMS-S-13165, note 5 to table VI (design/intensity.py).
 IRON = {
     "aluminium": "STEEL LEAVES IRON on aluminium: decontaminate (note 5 to table VI of SAE "
@@ -342,17 +342,12 @@ def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
         raise InputError(f"--shot: given {name!r}; {text}; give one of {known}")
     hardness = alloy(part).hardness_HB
     is_implant, metal = IMPLANT in part.split(), alloy(part).metal
-    if not name and (is_implant or metal in IRON) and _has(shop, CERAMIC):
+    if not name and (is_implant or metal in IRON) and shop.has(CERAMIC):
         return CERAMIC, f"steel leaves iron on {'an alloy of implants' if is_implant else metal}"
-    if name or (ball(STEEL).hardness_HB or 0.0) >= HARDER * hardness or not _has(shop, HARD):
+    if name or (ball(STEEL).hardness_HB or 0.0) >= HARDER * hardness or not shop.has(HARD):
         found = ball(name or STEEL).name
         return found, IRON.get(metal, "") if found == STEEL else ""
     return HARD, f"harder than the part, of {hardness:g} HB, which steel balls hardly dent"
-
-
-def _has(shop: Shop, material: str) -> bool:
-    """Return whether a shop has balls of a material."""
-    return not shop.balls or any(ball(one.material).name == material for one in shop.balls)
 
 
 def _read(path: Path, unit: str) -> PartMesh:

@@ -50,7 +50,8 @@ from chamberopt.common.number_text import plain, rounded
 RAISED = 1.0, 2.0, 3.0  # ball diameters by which a ceiling is raised for a second pose
 # When two sizes pay, by heart: coarse balls serve MOSTLY of the target, their intensity is so many
 # times that of the finer ones, and these serve so much more of the target, or take less than half
-# of the time. Finer balls for fillets, where parts fail, pay in any case.
+# of the time. For fillets, where parts fail, and for what coarse balls leave bare, they pay in any
+# case.
 STRONGER, MUCH = 1.5, 0.15
 # Warnings of fillets, slots and gaps that are too narrow, and of what no ball touches.
 NOT_SERVED = re.compile(r"^shot of |^[\d.]+% of |no ball gets in there")
@@ -172,7 +173,8 @@ def with_finer_balls(
         if weak is not None and found.intensity.value < STRONGER * weak.value:
             return None, f"{plain(weak.value, 2)} mmA of {finer_mm:g} mm are hardly less"
         budgets = [measured_budget(coarse, found), measured_budget(finer, after)]
-        if not for_fillets and gain < MUCH and budgets[1].treatment >= budgets[0].treatment:
+        is_needed = for_fillets or fine.touched > most.touched + AS_GOOD
+        if not is_needed and gain < MUCH and budgets[1].treatment >= budgets[0].treatment:
             longer = f"{rounded(budgets[1].treatment, 3)} s more for {gain:.0%} of the target"
             return None, f"{longer} do not pay: {shares}"
         two = _one_after_the_other(coarse, finer, budgets)

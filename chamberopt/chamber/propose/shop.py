@@ -26,6 +26,7 @@ from chamberopt.design.table_base import FileTable
 EXAMPLE = Path(__file__).with_name("usual_shop.toml")
 MOST = 200  # sonotrodes, sizes of balls and heights in one file
 AMPLITUDES = {"amplitudes_um": 500.0, "amplitudes_pv_um": 1000.0}  # the most of each [µm]
+STEEL, HARD = "steel", "tungsten_carbide"  # materials of balls
 Numbers = Annotated[Several[float], Field(max_length=MOST)]
 
 
@@ -169,6 +170,10 @@ class Shop(FileTable):
                         blocks = Blocks(size_mm=size, columns=columns, rows=rows)
                         if blocks.sides_mm[0] >= blocks.sides_mm[1]:
                             yield Face(one, blocks)
+
+    def has(self, material: str) -> bool:
+        """Return whether the shop has balls of a material."""
+        return not self.balls or any(ball(one.material).name == material for one in self.balls)
 
     def stock_mm(self, material: str) -> tuple[float, ...]:
         """Return the diameters [mm] in stock of balls of a material, in ascending order.

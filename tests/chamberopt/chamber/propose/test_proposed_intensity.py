@@ -14,10 +14,13 @@ from chamberopt.chamber.propose.proposed_balls import SizeFit, mostly_serving, s
 from chamberopt.chamber.propose.proposed_budget import Asked, Measured, propose_budget
 from chamberopt.chamber.propose.proposed_intensity import (
     INTENSITY,
+    LARGER,
     MOST_PILOTS,
     IntensityPilot,
     as_no_wish,
     beside_larger,
+    heavier_wishes,
+    instead_of_steel,
     is_off,
     larger_balls,
     propose_intensity,
@@ -34,7 +37,7 @@ from chamberopt.chamber.propose.proposed_setting import (
     setting_of,
     settings_of,
 )
-from chamberopt.chamber.propose.shop import Shop, load_shop
+from chamberopt.chamber.propose.shop import HARD, Shop, load_shop
 from chamberopt.chamber.propose.text import design_text, study_texts
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
@@ -415,3 +418,71 @@ def test_where_balls_are_too_weak_the_next_larger_ones_are_told_beside_them(
         assert larger_balls(made, wanted, asked, enough, again, measure) is None
     fixed = replace(wanted, ball_mm=1.0)
     assert larger_balls(made, fixed, asked, weak, again, measure) is None
+
+
+@pytest.mark.parametrize(
+    ("alloy", "intensity", "larger", "expected"),
+    [
+        ("42CrMo4", 0.05, False, HARD),  # too weak
+        ("42CrMo4", 0.12, True, HARD),  # what smaller balls would serve is left out
+        ("42CrMo4", 0.12, False, None),
+        ("7075-T6", 0.05, False, None),  # which would be bruised
+    ],
+)
+def test_heavier_balls_are_tried_where_steel_ones_that_serve_are_too_weak(
+    plate: Path, alloy: str, intensity: float, larger: bool, expected: str | None
+) -> None:
+    asked, wanted = WantedIntensity(0.10, 0.15), Wanted("mm", alloy=alloy)
+    made, found = propose(plate, wanted, lambda _: []), pilot_of(intensity, 600.0)
+    if larger:
+        made = replace(made, reasons={**made.reasons, "shot.diameter_mm": f"{LARGER}: 83%"})
+    wishes = heavier_wishes(made, wanted, asked, found)
+    assert (wishes.shot if wishes else None) == expected
+    for other in (replace(wanted, shot="steel"), replace(wanted, ball_mm=1.0)):
+        assert heavier_wishes(made, other, asked, found) is None  # steel, or one size, as asked
+
+
+def test_heavier_balls_are_not_tried_if_the_shop_has_none(plate: Path, shop: Shop) -> None:
+    wanted = Wanted("mm", alloy="42CrMo4", shop=shop)  # which has steel balls alone
+    made = propose(plate, wanted, lambda _: [])
+    weak = pilot_of(0.05, 600.0)
+    assert heavier_wishes(made, wanted, WantedIntensity(0.10, 0.15), weak) is None
+
+
+@pytest.mark.parametrize(
+    ("steel", "heavy", "served", "taken"),
+    [
+        (0.05, 0.12, (0.95, 0.95), True),  # serves as much, and gives the intensity
+        (0.12, 0.12, (0.80, 0.95), True),  # serves more, and gives it too
+        (0.12, 0.12, (0.95, 0.95), False),
+        (0.05, 0.12, (0.95, 0.60), False),  # would leave much bare
+        (0.12, 0.30, (0.80, 0.95), False),  # too strong
+    ],
+)
+def test_heavier_balls_are_taken_where_they_do_more(
+    plate: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    steel: float,
+    heavy: float,
+    served: tuple[float, float],
+    taken: bool,
+) -> None:
+    asked = WantedIntensity(0.10, 0.15)
+    made, other = (
+        propose(plate, Wanted("mm", alloy="42CrMo4", ball_mm=ball, shot=shot), lambda _: [])
+        for ball, shot in ((3.0, "steel"), (1.5, HARD))
+    )
+    by_size = dict(zip((3e-3, 1.5e-3), served, strict=True))
+    monkeypatch.setattr(
+        "chamberopt.chamber.propose.proposed_intensity.fit_sizes",
+        lambda _, sizes: [fit(1e3 * one, served=by_size[round(one, 6)]) for one in sizes],
+    )
+    pilots = [pilot_of(one, 600.0) for one in (steel, heavy)]
+    better = instead_of_steel(made, pilots[0], other, pilots[1], asked)
+    assert (better is not None) is taken
+    assert instead_of_steel(made, pilots[0], other, None, asked) is None
+    if better is not None:
+        assert better.design == other.design
+        text = better.reasons["shot.material"]
+        assert f"1.5 mm at 40 µm about {heavy:g} mmA on the {served[1]:.0%}" in text
+        assert f"of steel 3 mm at 40 µm about {steel:g} mmA on the {served[0]:.0%}" in text
