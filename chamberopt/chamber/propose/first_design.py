@@ -103,6 +103,10 @@ IRON = {
     "titanium": "STEEL LEAVES IRON on titanium: decontaminate, or ceramic balls, such as --shot "
     "zirconia (by heart)",
 }
+ON_STAINLESS = (
+    "STEEL LEAVES IRON on stainless steel, which rusts: passivate the part, or ceramic balls, such "
+    "as --shot zirconia (by heart)"
+)
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
 BETWEEN = "a plate that fits between the faces of the part, like the two walls beside them"
 CUT_OUT = "plates, cut out round it"
@@ -168,12 +172,13 @@ def _lying(
         turns, reason: the pose [degrees], and why.
     """
     upright = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, "standing")
+    by_root: Proposal | None = None
     if (bare := bare_end(mesh, target, upright)) is not None:
         with suppress(InputError):
             root = bare._replace(turns=turns)
-            made = _proposed(path, wanted, mesh, known, target, turns, reason, root)
-            if is_firm(made) and not rests(made):
-                return made
+            by_root = _proposed(path, wanted, mesh, known, target, turns, reason, root)
+            if is_firm(by_root) and not rests(by_root):
+                return by_root
     along = mesh.vertices @ rotation_matrix(upright)[2]
     whole = np.ptp(along[mesh.triangles[target.triangles]]) > REACHES * np.ptp(along)
     for of_any in (False, True):
@@ -182,7 +187,9 @@ def _lying(
         made = _proposed(path, wanted, mesh, known, target, turns, reason, lying)
         if end is not None or keeps_target or not whole or is_firm(made):
             break
-    return made
+    # Balls that rest on the part speak against a pose, not against what holds it there.
+    as_calm = by_root is not None and rests(made) and faults(by_root) <= faults(made)
+    return by_root if by_root is not None and as_calm and is_firm(by_root) else made
 
 
 def _proposed(
@@ -346,7 +353,8 @@ def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
         return CERAMIC, f"steel leaves iron on {'an alloy of implants' if is_implant else metal}"
     if name or (ball(STEEL).hardness_HB or 0.0) >= HARDER * hardness or not shop.has(HARD):
         found = ball(name or STEEL).name
-        return found, IRON.get(metal, "") if found == STEEL else ""
+        on_steel = ON_STAINLESS if alloy(part).stainless else ""
+        return found, IRON.get(metal, on_steel) if found == STEEL else ""
     return HARD, f"harder than the part, of {hardness:g} HB, which steel balls hardly dent"
 
 
@@ -446,7 +454,7 @@ def _place(
             sizes = propose_sizes(posed, float(posed[:, 2].max()), ball, shape, wider)
         local = None
         if is_local and shape == "box":
-            at_wall = None if out is None else AT_WALL * ball
+            at_wall = None if out is None else AT_WALL * wider * ball
             local = local_room(posed, mesh.triangles, target.triangles, sizes, at_wall)
             sizes = local.sizes
         try:

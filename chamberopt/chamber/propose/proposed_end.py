@@ -215,16 +215,19 @@ def local_room(
     Args:
         posed, triangles, target: as of closing_faces.
         sizes: those of a box with the usual room beside and above the target.
-        at_wall: distance from the target of the wall through which an end goes out along x [m].
+        at_wall: distance from the target of the wall through which an end goes out along x [m]. The
+            wall at the other end is as near, if the part goes out through it too.
     """
     on_target = posed[np.unique(triangles[target])]
     faces = closing_faces(posed, triangles, target, sizes.gap) + BEHIND * np.array([[-1.0], [1.0]])
     walls = np.array([on_target.min(axis=0) - sizes.gap, on_target.max(axis=0) + sizes.gap])
+    near = np.zeros(2, dtype=bool)  # walls along x through which an end goes out
     if at_wall is not None:
-        walls[1, 0] += at_wall - sizes.gap
+        near[:] = float(posed[:, 0].min()) < walls[0, 0], True
+        walls[:, 0] += near * (at_wall - sizes.gap) * np.array([-1.0, 1.0])
     closes = np.isfinite(faces)
     walls, kept = np.where(closes, faces, walls)[:, :2], np.array(closes[:, :2])
-    kept[1, 0] |= at_wall is not None
+    kept[:, 0] |= near
     plan = dict(sizes.plan)
     for k, key in enumerate(("length_mm", "width_mm")):
         if kept[:, k].any():

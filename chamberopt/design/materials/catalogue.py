@@ -100,6 +100,7 @@ class Alloy(Named):
     """A metal of parts, walls and sonotrodes, in one condition."""
 
     metal: str = Field(description="its base metal, for friction")
+    stainless: bool = Field(default=False, description="of a steel, on which iron would rust")
     hardness_HB: float = quantity(5, 1000, "HB", "Brinell hardness of the surface")  # noqa: N815
     yield_MPa: float | None = quantity(10, 5000, "MPa", "yield strength", None)  # noqa: N815
     tensile_MPa: float | None = quantity(10, 5000, "MPa", "tensile strength", None)  # noqa: N815

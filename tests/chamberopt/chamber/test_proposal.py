@@ -158,8 +158,8 @@ def test_balls_are_harder_than_the_part(wanted: str, part: str, stock: str, mate
     assert bool(reason) is ("LEAVES IRON" in reason or (not wanted and material != "steel"))
 
 
-@pytest.mark.parametrize("part", ["7075-T6", "Ti-6Al-4V"])
-def test_steel_balls_on_light_metals_leave_iron(part: str) -> None:
+@pytest.mark.parametrize("part", ["7075-T6", "Ti-6Al-4V", "17-4PH"])
+def test_steel_balls_on_light_metals_and_stainless_steel_leave_iron(part: str) -> None:
     assert "LEAVES IRON" in _shot("steel", part, usual_shop())[1]
     assert not _shot("zirconia", part, usual_shop())[1]
 
