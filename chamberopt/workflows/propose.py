@@ -270,7 +270,7 @@ class _Pilots:
         by_geometry = setting_of(made).ball_mm
         made = propose_intensity(made, wanted, asked, self._again, self._predict)
         found = self._measure(made)
-        if (other := heavier_wishes(made, wanted, asked, found)) is not None:
+        if (other := heavier_wishes(made, wanted, asked, found, by_geometry)) is not None:
             with suppress(InputError):  # which is no reason to stop: steel balls do something
                 heavy, _, ball_mm, told = self._for_intensity(self._again(other), other, asked)
                 if (better := instead_of_steel(made, found, heavy, told, asked)) is not None:

@@ -42,7 +42,7 @@ from chamberopt.design.intensity import (
     usual_intensity,
     why_none,
 )
-from chamberopt.design.materials import alloy
+from chamberopt.design.materials import alloy, ball
 from chamberopt.geometry.thickness import depth_below
 
 MOST_PILOTS = 5
@@ -195,24 +195,36 @@ def larger_balls(
 
 
 def heavier_wishes(
-    made: Proposal, wanted: Wanted, intensity: WantedIntensity, found: Measured | None
+    made: Proposal,
+    wanted: Wanted,
+    intensity: WantedIntensity,
+    found: Measured | None,
+    by_geometry: float,
 ) -> Wanted | None:
-    """Return wishes for heavier balls, where steel balls that serve the target well are too weak.
+    """Return wishes for heavier balls, where steel balls that serve the target are a bit too weak.
 
     By Kirk's formula (coverage/dents.py) the strength of an impact goes with the root of the ball's
-    density, so that heavier balls may be smaller. It is None where steel does, was asked for, or is
-    all that the shop has, and for metals on which it is not usual.
+    density, so that heavier balls may be smaller. It is None where steel does, where heavier balls
+    of the size that serves the target would be too weak too, where a material or size was asked
+    for, and for metals on which such balls are not usual.
 
     Args:
         found: what a pilot measured of the proposal; None if nothing.
+        by_geometry: diameter of the balls that geometry alone would give [mm].
     """
     shop, material = wanted.shop or usual_shop(), made.tables["shot"]["material"]
     is_open = not wanted.shot and wanted.ball_mm is None and material == STEEL and shop.has(HARD)
     if not is_open or alloy(made.tables["materials"]["part"]).metal not in HEAVY_FOR:
         return None
-    is_weak = found is not None and found.intensity is not None and _off(intensity, found) < 0.0
+    if found is None or found.intensity is None:
+        return None
     leaves_out = LARGER in made.reasons["shot.diameter_mm"]
-    return replace(wanted, shot=HARD) if is_weak or leaves_out else None
+    if intensity.off(found.intensity.value) >= 0.0 and not leaves_out:
+        return None
+    most = Setting(by_geometry, max(amplitudes_of(made.sonotrode)[1]))
+    of_serving = expected_intensity(most, {setting_of(made): found.intensity.value})
+    heavier = math.sqrt(ball(HARD).density_kg_m3 / ball(STEEL).density_kg_m3)
+    return replace(wanted, shot=HARD) if intensity.off(heavier * of_serving) >= 0.0 else None
 
 
 def instead_of_steel(

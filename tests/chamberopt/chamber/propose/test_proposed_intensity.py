@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -423,10 +424,11 @@ def test_where_balls_are_too_weak_the_next_larger_ones_are_told_beside_them(
 @pytest.mark.parametrize(
     ("alloy", "intensity", "larger", "expected"),
     [
-        ("42CrMo4", 0.05, False, HARD),  # too weak
+        ("42CrMo4", 0.08, False, HARD),  # a bit too weak
+        ("42CrMo4", 0.05, False, None),  # 1.38 times as much is not enough either
         ("42CrMo4", 0.12, True, HARD),  # what smaller balls would serve is left out
         ("42CrMo4", 0.12, False, None),
-        ("7075-T6", 0.05, False, None),  # which would be bruised
+        ("7075-T6", 0.08, False, None),  # which would be bruised
     ],
 )
 def test_heavier_balls_are_tried_where_steel_ones_that_serve_are_too_weak(
@@ -436,17 +438,23 @@ def test_heavier_balls_are_tried_where_steel_ones_that_serve_are_too_weak(
     made, found = propose(plate, wanted, lambda _: []), pilot_of(intensity, 600.0)
     if larger:
         made = replace(made, reasons={**made.reasons, "shot.diameter_mm": f"{LARGER}: 83%"})
-    wishes = heavier_wishes(made, wanted, asked, found)
+    size = setting_of(made).ball_mm
+    wishes = heavier_wishes(made, wanted, asked, found, size)
     assert (wishes.shot if wishes else None) == expected
     for other in (replace(wanted, shot="steel"), replace(wanted, ball_mm=1.0)):
-        assert heavier_wishes(made, other, asked, found) is None  # steel, or one size, as asked
+        assert heavier_wishes(made, other, asked, found, size) is None  # as asked
 
 
 def test_heavier_balls_are_not_tried_if_the_shop_has_none(plate: Path, shop: Shop) -> None:
     wanted = Wanted("mm", alloy="42CrMo4", shop=shop)  # which has steel balls alone
     made = propose(plate, wanted, lambda _: [])
-    weak = pilot_of(0.05, 600.0)
-    assert heavier_wishes(made, wanted, WantedIntensity(0.10, 0.15), weak) is None
+    asked, weak = WantedIntensity(0.10, 0.15), pilot_of(0.08, 600.0)
+    assert heavier_wishes(made, wanted, asked, weak, setting_of(made).ball_mm) is None
+
+
+@cache
+def proposed(part: Path, ball_mm: float, shot: str) -> Proposal:
+    return propose(part, Wanted("mm", alloy="42CrMo4", ball_mm=ball_mm, shot=shot), lambda _: [])
 
 
 @pytest.mark.parametrize(
@@ -468,10 +476,7 @@ def test_heavier_balls_are_taken_where_they_do_more(
     taken: bool,
 ) -> None:
     asked = WantedIntensity(0.10, 0.15)
-    made, other = (
-        propose(plate, Wanted("mm", alloy="42CrMo4", ball_mm=ball, shot=shot), lambda _: [])
-        for ball, shot in ((3.0, "steel"), (1.5, HARD))
-    )
+    made, other = (proposed(plate, ball, shot) for ball, shot in ((3.0, "steel"), (1.5, HARD)))
     by_size = dict(zip((3e-3, 1.5e-3), served, strict=True))
     monkeypatch.setattr(
         "chamberopt.chamber.propose.proposed_intensity.fit_sizes",
