@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -210,6 +210,13 @@ def render_replay(job: dict[str, Any]) -> Iterator[int | None]:
     yield None
 
 
+def lately_hit(flight: Mapping[str, Any], now: float, recent: float) -> np.ndarray:
+    """Return which balls have hit the part within the time `recent` [s] before `now` [s], (n,)."""
+    time = flight["hit_time"]
+    balls = flight["hit_ball"][(time <= now) & (time > now - recent)]
+    return np.isin(np.arange(len(flight["diameter"])), balls)
+
+
 class _ReplayScene:
     """The chamber with part, balls and dents in a pyvista plotter, shown frame after frame."""
 
@@ -246,8 +253,7 @@ class _ReplayScene:
             self.sonotrodes[int(tag)].position = displacement[number]
         for actor in self.part:
             actor.user_matrix = flight["pose"][number]
-        recent = (flight["hit_time"] <= now) & (flight["hit_time"] > now - self.recent)
-        hit = np.isin(np.arange(len(flight["diameter"])), flight["hit_ball"][recent])
+        hit = lately_hit(flight, now, self.recent)
         self._show_balls("balls", number, ~hit, BALL)
         self._show_balls("balls that hit", number, hit, HIT)
         dents = self._show_dents(number)

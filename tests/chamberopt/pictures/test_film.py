@@ -9,7 +9,7 @@ from PIL import Image, ImageSequence
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claimed
 from chamberopt.pictures import film
-from chamberopt.pictures.film import film_path, write_film
+from chamberopt.pictures.film import film_path, lately_hit, write_film
 
 
 def test_films_play_back_as_they_were_written(tmp_path: Path) -> None:
@@ -75,3 +75,13 @@ def test_where_no_film_can_be_is_said(tmp_path: Path, monkeypatch: pytest.Monkey
     ):
         with pytest.raises(InputError, match=said):
             film.require_playable(fps, size, frames, Path(name))
+
+
+def test_balls_are_marked_for_a_while_after_they_hit() -> None:
+    flight = {
+        "hit_time": np.array([0.1, 0.2, 0.3, 0.4]),
+        "hit_ball": np.array([0, 1, 2, 1]),
+        "diameter": np.ones(4),
+    }
+    for now, balls in ((0.05, []), (0.1, [0]), (0.25, [0, 1]), (0.32, [1, 2]), (0.9, [])):
+        assert np.flatnonzero(lately_hit(flight, now, 0.2)).tolist() == balls

@@ -8,9 +8,10 @@ import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.dents import dents_on_part
-from chamberopt.results.impacts import simulate_dents
+from chamberopt.results import impacts
+from chamberopt.results.impacts import COSTED, simulate_dents, simulation_seconds
 from chamberopt.results.rebuild import rebuild_replica
-from sim_core import simulate
+from sim_core import Scene, simulate
 from tests.helpers.results.short_plate import plate_result
 
 
@@ -31,3 +32,21 @@ def test_a_peening_continues_the_replica_of_the_result(tmp_path: Path) -> None:
     for time in (0.0, 601.0, float("nan")):
         with pytest.raises(InputError, match="--at-s"):
             simulate_dents(replica, time)
+
+
+def test_what_simulating_costs_goes_with_the_simulated_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A clock that advances by the simulated time costs as many seconds as are simulated."""
+    replica = rebuild_replica(plate_result(tmp_path / "plate"))
+    clock = [7.0]
+
+    def simulated(scene: Scene, **_: object) -> None:
+        clock[0] += scene.warmup + scene.duration
+
+    monkeypatch.setattr(impacts, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr("sim_core.simulate", simulated)
+    for time in (0.5, 3.0):
+        whole = replica.scene.warmup + time
+        assert simulation_seconds(replica, time) == pytest.approx(whole)
+    assert COSTED < 1.0
