@@ -52,7 +52,8 @@ def observe(
     known = next(trial.metrics.keys() | trial.parameters.keys() for trial in trials if trial.goals)
     limited = ((name, limits) for name, limits in constraints.items() if name in known)
     figures = (_limited_figure(name, limits, trials) for name, limits in limited)
-    return Observations(score, variance, simulated, tuple(figures), spared)
+    by_geometry = all(trial.refused or trial.goals for trial in trials)
+    return Observations(score, variance, simulated, tuple(figures), spared, by_geometry=by_geometry)
 
 
 def fit_model(

@@ -27,11 +27,14 @@ class Axis(NamedTuple):
         different.
     where: None if all points have the parameter. Else the position of another parameter that
         decides, and the levels (values) of the other parameter for which points have this one.
+    shapes: whether it may change the chamber's shape, and so what geometry refuses. The mass of the
+        shot does not.
     """
 
     levels: int = 0
     ordered: bool = True
     where: tuple[int, frozenset[int]] | None = None
+    shapes: bool = True
 
 
 class Domain:
@@ -71,6 +74,10 @@ class Domain:
         level = np.where(self._are_ordered, np.rint(points * self._steps), choice)
         snapped = np.where(self.free, points, level / self._steps)
         return np.where(self.has(snapped), snapped, 0.0)
+
+    def shape_of(self, points: np.ndarray) -> np.ndarray:
+        """Return points (k, d) with the coordinate 0 for each parameter that changes no shape."""
+        return np.where([axis.shapes for axis in self.axes], points, 0.0)
 
     def has(self, snapped: np.ndarray) -> np.ndarray:
         """Return which parameters each point has, (k, d) bool.

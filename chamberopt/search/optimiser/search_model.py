@@ -50,6 +50,7 @@ class Observations:
         bool. Their scores are the largest scores that they can have. The other candidates without
         a simulation could not be simulated.
     counts: smallest gain of the score that counts; 0 if any gain does.
+    by_geometry: whether geometry refused all candidates that were not simulated.
     """
 
     scores: np.ndarray
@@ -58,6 +59,7 @@ class Observations:
     figures: tuple[LimitedFigure, ...] = ()
     spared: np.ndarray | None = None
     counts: float = 0.0
+    by_geometry: bool = False
 
 
 class SearchModel:
@@ -90,6 +92,13 @@ class SearchModel:
             at = points[:count][of]
             return GaussianProcess(at, values[of], variances[of], length_factor, running, domain)
 
+        def of_shape() -> GaussianProcess:
+            """Model what can be simulated, by the shape alone if geometry refused the rest."""
+            at, still = (self._seen_by_geometry(one) for one in (points[:count], running))
+            return GaussianProcess(
+                at, known.astype(float), np.zeros(count), length_factor, still, domain
+            )
+
         known = there if seen.spared is None or not learns_bounds else there | seen.spared
         middle, top = float(np.median(seen.scores[there])), float(seen.scores[there].max())
         raised = middle - MAX_DEPTH * (top - middle)
@@ -104,9 +113,12 @@ class SearchModel:
             for one in seen.figures
             if np.ptp(one.values[there]) > 0.0
         ]
-        if not known.all():
-            everywhere = model(known.astype(float), np.zeros(count), np.ones(count, dtype=bool))
-            self._limits.append((everywhere, LEAST_SIMULATED, np.inf))
+        self._by_geometry = seen.by_geometry
+        self._can_be_simulated = None if known.all() else of_shape()
+
+    def _seen_by_geometry(self, points: np.ndarray) -> np.ndarray:
+        """Return points (k, d) as what refuses candidates sees them."""
+        return self.domain.shape_of(points) if self._by_geometry else points
 
     def expected(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return mean and standard deviation of the score that a shop gets at points (k, d), (k,).
@@ -157,8 +169,12 @@ class SearchModel:
         from scipy.special import ndtr
 
         probability = np.ones(len(at))
-        for model, low, high in self._limits:
-            mean, deviation = model(at)
+        models = [(model, at, low, high) for model, low, high in self._limits]
+        if self._can_be_simulated is not None:
+            shape = self._seen_by_geometry(at)
+            models.append((self._can_be_simulated, shape, LEAST_SIMULATED, np.inf))
+        for model, place, low, high in models:
+            mean, deviation = model(place)
             inside = min(margin * np.sqrt(model.noise), 0.25 * (high - low))  # of a narrow band
             probability *= np.maximum(
                 ndtr((high - inside - mean) / deviation) - ndtr((low + inside - mean) / deviation),

@@ -27,6 +27,13 @@ from chamberopt.design.table_base import FileTable
 from chamberopt.design.tolerances import tolerance_box
 from chamberopt.search.optimiser.domain import Axis, Domain
 
+# Parameters that change no shape, beside those of the tables process and materials.
+OF_SHOT_AND_DRIVE = {
+    "shot.mass_g",
+    "sonotrode.amplitude_um",
+    "sonotrode.amplitude_pv_um",
+    "sonotrode.frequency_khz",
+}
 ON_BOUND = 1e-3  # share of the bounds' distance
 NEAR = 1e-9  # of a step: how far a value may be from its place
 MAX_LEVELS = 1000
@@ -331,6 +338,11 @@ def _where(
     return list(vary).index(SHAPE), frozenset(levels)
 
 
+def _shapes(name: str) -> bool:
+    """Return whether a parameter may change the chamber's shape or what balls can touch in it."""
+    return name not in OF_SHOT_AND_DRIVE and not name.startswith(("process.", "materials."))
+
+
 class ParameterSpace:
     """Converts values of a study's varied parameters to points of the unit cube, and back.
 
@@ -354,7 +366,7 @@ class ParameterSpace:
         designs = {name: with_key(by_shape, name) or design for name in vary}
         misses = np.array([_misses(designs, vary, side) for side in (0, 1)]) / (high - low)
         axes = [
-            Axis(len(levels), not one.texts, _where(by_shape, vary, name))
+            Axis(len(levels), not one.texts, _where(by_shape, vary, name), _shapes(name))
             for levels, (name, one) in zip(self._levels, vary.items(), strict=True)
         ]
         self.domain = Domain(axes, misses, counts_worst)

@@ -156,3 +156,17 @@ def test_where_the_worst_counts_a_plateau_wins_over_a_peak() -> None:
     assert by_mean.expected(at)[0][0] == pytest.approx(0.67, abs=0.08)
     assert by_worst.covariance(at, at).shape == (1, 1)
     assert propose_point(by_worst, np.random.default_rng(0)).shape == (2,)
+
+
+@pytest.mark.parametrize("by_geometry", [True, False])
+def test_what_geometry_refuses_does_not_depend_on_the_mass(by_geometry: bool) -> None:
+    """All refused points have a large first coordinate, and by chance a large second one too."""
+    points = np.array([[0.1, 0.1], [0.3, 0.2], [0.5, 0.1], [0.4, 0.3], [0.8, 0.8], [0.9, 0.9]])
+    there = points[:, 0] < 0.6
+    seen = Observations(points[:, 0], np.full(6, 1e-4), there, by_geometry=by_geometry)
+    model = SearchModel(Domain([Axis(), Axis(shapes=False)]), points, seen)
+    at = np.array([[0.4, 0.2], [0.4, 0.9], [0.85, 0.2]])
+    light, heavy, far = (float(one) for one in model.feasible(at))
+    assert light > 0.9
+    assert (heavy > 0.9) is by_geometry  # else either coordinate may be the reason
+    assert (far < 0.1) is by_geometry
