@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from chamberopt.chamber.checks.fillets import OF_FILLET, OF_SLOT
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.proposed_target import area_in_mm2
 from chamberopt.chamber.propose.text import TO_SETTLE, clauses, to_settle
@@ -28,6 +29,11 @@ if TYPE_CHECKING:
 WIDTH, INDENT = 79, 13  # columns
 MOST_LISTED = 6  # surfaces, without --verbose
 SIMULATED = "simulated"  # the row that is told with --verbose alone
+SERVES = (
+    "Balls touch a place that they get to. They serve it if it also lies in no fillet of less than "
+    f"{1 / OF_FILLET:g} diameters' radius and in no slot of less than {1 / OF_SLOT:g} diameters: "
+    "these are peened slowly. It is covered once dents lie on it."
+)
 KINDS = {"bore": "the part itself, out through a wall"}  # of holders, in words
 MINUTE, HOUR = 60.0, 3600.0  # s
 
@@ -131,6 +137,8 @@ def proposal_lines(told: ProposalInWords, verbose: bool) -> list[str]:
         lines += ["", "To be settled before it is built:"]
         for number, matter in enumerate(told.matters, 1):
             lines += wrapped(f"{number:2}. {matter.mark}{matter.text}", 4)
+    if any("serve" in reason for row in told.rows for reason in row.reasons):
+        lines += ["", *wrapped(SERVES, 0)]
     most = len(told.choices) if verbose else MOST_LISTED
     return [*lines, "", *choice_lines(told.choices, most)]
 

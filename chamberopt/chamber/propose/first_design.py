@@ -83,7 +83,7 @@ from chamberopt.design.design import Design, validate
 from chamberopt.design.materials import CATALOGUE, USUAL, alloy, ball, balls
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.meshes.surface_error import format_box
-from chamberopt.geometry.meshes.units import BY_SIZE
+from chamberopt.geometry.meshes.units import BY_SIZE, METRES_PER
 from chamberopt.geometry.triangles import rotation_matrix
 
 REACHES = 0.95  # of a part's length, from which on a target reaches both of its ends
@@ -242,9 +242,13 @@ def _proposed(
     if not (end or wanted.pose) and (hanging := _hanging(mesh, target, turns, diameter, wanted)):
         turns, pose_reason = hanging, ON_END
     is_guessed = any(f"({BY_SIZE})" in note for note in mesh.notes)
+    measures = f"the part measures {format_box(mesh.size)}"
+    by = "as asked" if wanted.unit in METRES_PER else "by the file"
     reasons = {
         "sonotrode.blocks": of_blocks(diameter),
-        "part.unit": f"{'UNIT GUESSED: ' * is_guessed}the part measures {format_box(mesh.size)}",
+        "part.unit": f"UNIT GUESSED: {measures}"
+        if is_guessed
+        else f"{measures}, as its numbers are in {mesh.unit}, {by}",
         "part.target": target.reason,
         "shot.diameter_mm": ball_reason,
         **({"shot.material": shot_reason} if shot_reason else {}),
