@@ -128,6 +128,7 @@ class Judge:
             feasible=not violations,
             reason="; ".join(violations),
             replicas=answer.replicas,
+            reachable=None if answer.evaluation is None else answer.evaluation.reachable,
         )
 
 

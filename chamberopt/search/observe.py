@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 # A figure counts as at most so many times as far outside its limit as the median candidate is away
 # from it.
 MAX_OUTSIDE = 3.0
+# Share of the target that a candidate may reach less than the best one, for a smooth model.
+LOST = 0.05
 FIRST_OBJECTIVE = np.array([1.0, 0.0])  # weights of two objectives
 
 
@@ -38,8 +40,8 @@ def observe(
     Args:
         weight: weights of two objectives in the score, (2,); not used if there is one objective.
     """
-    simulated = np.array([bool(trial.goals) for trial in trials])
-    spared = np.array([trial.highest is not None for trial in trials])
+    simulated, cut_off = np.array([bool(trial.goals) for trial in trials]), _cut_off(trials)
+    spared = cut_off | np.array([trial.highest is not None for trial in trials])
     some = next(trial.goals for trial in trials if trial.goals)
     rows = [trial.goals or some for trial in trials]
     values = np.array([[goal.value for goal in goals] for goals in rows])
@@ -52,8 +54,25 @@ def observe(
     known = next(trial.metrics.keys() | trial.parameters.keys() for trial in trials if trial.goals)
     limited = ((name, limits) for name, limits in constraints.items() if name in known)
     figures = (_limited_figure(name, limits, trials) for name, limits in limited)
+    simulated &= ~cut_off
     by_geometry = all(trial.refused or trial.goals for trial in trials)
     return Observations(score, variance, simulated, tuple(figures), spared, by_geometry=by_geometry)
+
+
+def _cut_off(trials: Sequence[Trial]) -> np.ndarray:
+    """Return which candidates miss so much of the target that the best one reaches, (n,) bool.
+
+    Their scores fall by a step, where a ceiling cuts off the part or balls no longer get above it.
+    A smooth model would take the step for the effect of another parameter, such as the mass of the
+    shot. None is left out where fewer points than a plane takes would be left.
+    """
+    none = np.zeros(len(trials), dtype=bool)
+    known = [one for one in trials if one.goals and one.reachable is not None]
+    if not known:
+        return none
+    least = (max(known, key=lambda one: one.score).reachable or 0.0) - LOST
+    found = np.array([one.reachable is not None and one.reachable < least for one in trials])
+    return found if len(known) - found.sum() > len(trials[0].point) else none
 
 
 def fit_model(

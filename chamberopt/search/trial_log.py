@@ -39,6 +39,7 @@ class Trial:
     replicas: int | None = None  # that were simulated; None when the evaluation failed
     highest: float | None = None  # largest objective by reach alone, if that spared a simulation
     refused: bool = False  # whether geometry ruled the candidate out before any simulation
+    reachable: float | None = None  # share of the target that a ball can touch, if simulated
 
     @property
     def objective(self) -> Estimate | None:
@@ -65,8 +66,9 @@ class Trial:
             "feasible": self.feasible,
             "reason": self.reason,
             "metrics": {name: metric.interval_json() for name, metric in self.metrics.items()},
-            # Only where it is so: rows of before the key stay as they were written.
+            # Only where it is so: rows of before the keys stay as they were written.
             **({"refused": True} if self.refused else {}),
+            **({} if self.reachable is None else {"reachable": self.reachable}),
         }
 
     @classmethod
@@ -95,6 +97,7 @@ class Trial:
             replicas=None if row["replicas"] is None else int(row["replicas"]),
             highest=None if row["highest"] is None else float(row["highest"]),
             refused=bool(row.get("refused", False)),
+            reachable=float(row["reachable"]) if "reachable" in row else None,
         )
         if trial.row() != row:  # a text or true in the place of a number, or words of its own
             raise ValueError("not as it was written")
