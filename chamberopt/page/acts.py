@@ -29,7 +29,7 @@ from chamberopt.documents.comparison import comparison_end
 from chamberopt.documents.report import answer_section
 from chamberopt.documents.study import aim_in_words
 from chamberopt.documents.wording import plain
-from chamberopt.page.answers import part_answer, shape_answer, step_texts
+from chamberopt.page.answers import part_answer, shape_answer, step_texts, surface_answer
 from chamberopt.page.checker import Checker
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
@@ -157,7 +157,11 @@ class Acts:
         return self._as_read(self._read())
 
     def part(self, asked: object) -> bytes:
-        return part_answer(self._file(asked).design)
+        return part_answer(preview_part(self._file(asked).design).mesh)
+
+    def surface(self, asked: Any) -> bytes:
+        """Return which triangles of the part are its surface of a name."""
+        return surface_answer(preview_part(self._file(asked).design).mesh, str(asked["name"]))
 
     def shape(self, asked: Any) -> bytes:
         return shape_answer(

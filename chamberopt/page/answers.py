@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from itertools import groupby
 from typing import Any
 
@@ -14,7 +15,12 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import first_warnings, matters, notes, shot_reach
 from chamberopt.chamber.checks.facts import describe, first_facts, with_clearance
 from chamberopt.chamber.part import chosen_on_part, chosen_triangles, named_surface, preview_part
-from chamberopt.chamber.propose.proposed_target import named_surfaces
+from chamberopt.chamber.propose.proposed_target import (
+    Surface,
+    find_surface,
+    named_surfaces,
+    surfaces,
+)
 from chamberopt.chamber.reach import reached_part_share
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.number_text import percent, plain
@@ -22,9 +28,10 @@ from chamberopt.design.design import Design
 from chamberopt.design.part import Selection
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.documents.facts import facts_in_words
+from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.triangles import border_edges, sharp_edges
 from chamberopt.page.page_words import Words, on_page
-from chamberopt.pictures.charts.colours import EDGES, KINDS
+from chamberopt.pictures.charts.colours import EDGES, GREEN, KINDS
 
 # Where a triangle of the part is: numbers of these kinds.
 STATES = "rest", "target", "outside", "unreached", "zone", "holder", "mask"
@@ -33,21 +40,35 @@ REST, TARGET, BEYOND, MISSED, ZONE, HELD, MASKED = range(7)
 ARRAY_TYPES = {"f": "<f4", "i": "<u4", "u": "<u4", "b": "u1"}
 
 
-def part_answer(design: Design) -> bytes:
+def part_answer(mesh: PartMesh) -> bytes:
     """Return the part as its file has it [mm], its named surfaces with areas, and the colours.
 
     The number of a triangle in `surface` is that of the name of its surface in `groups`.
     """
-    mesh = preview_part(design).mesh
     names = [[one.name, one.text] for one in named_surfaces(mesh)]
     box = [round(1e3 * float(side), 4) for side in mesh.size]
     head = {"names": names, "box_mm": box, "unit": mesh.unit, "notes": list(mesh.notes)}
-    head |= {"kinds": KINDS, "states": STATES, "edges": EDGES}
+    head |= {"kinds": KINDS, "states": STATES, "edges": EDGES, "pointed": GREEN}
     head |= {"closed": not len(border_edges(mesh.triangles))}  # or a piece of a drawn set-up
     named = named_surface(mesh)
     head |= {"groups": list(mesh.groups)}
     surface = {} if named is None else {"surface": named.astype(np.uint32)}  # -1 is no number then
     return packed(head, points=1e3 * mesh.vertices, triangles=mesh.triangles, **surface)
+
+
+def surface_answer(mesh: PartMesh, name: str) -> bytes:
+    """Return the numbers of the triangles of one of the part's surfaces, such as "face 3".
+
+    Raises InputError if the part has no surface of this name.
+    """
+    known = () if name in mesh.groups else _surfaces(mesh)  # faces take longer to find
+    found = np.flatnonzero(find_surface(mesh, known, name).triangles)
+    return packed({}, triangles=found)
+
+
+@lru_cache(maxsize=2)
+def _surfaces(mesh: PartMesh) -> list[Surface]:
+    return surfaces(mesh)
 
 
 def step_texts(design: Design) -> list[str]:

@@ -21,10 +21,11 @@ from chamberopt.design.load import is_study
 from chamberopt.design.materials import alloys, balls
 from chamberopt.documents.proposal import SIMULATED
 from chamberopt.geometry.meshes.formats import SUFFIXES, is_mesh_name
-from chamberopt.geometry.meshes.part_mesh import keep_part, read_part_cached
+from chamberopt.geometry.meshes.part_mesh import PartMesh, keep_part, read_part_cached
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import METRES_PER, STATED, UnknownUnitError
 from chamberopt.page.acts import Acts, free_folder, path_inside
+from chamberopt.page.answers import part_answer, surface_answer
 from chamberopt.page.page_words import choices, on_page
 from chamberopt.page.started_commands import JSON, OneCommand
 from chamberopt.workflows.propose import PICTURE, Wishes
@@ -111,16 +112,38 @@ class Front:
 
         The sizes by unit are empty where the file states its unit, or `asked` gives it.
         """
+        try:
+            mesh = self._part(asked)
+        except UnknownUnitError as error:
+            return {"sizes": error.sizes, "size": "", "names": []}
+        names = [[one.name, one.text] for one in named_surfaces(mesh)[:MOST_NAMES]]
+        return {"sizes": {}, "size": format_box(mesh.size), "names": names}
+
+    def view(self, asked: Any) -> bytes:
+        """Return what the page draws of a part, in any of its possible units."""
+        return part_answer(self._part_of_any_unit(asked))
+
+    def face(self, asked: Any) -> bytes:
+        """Return which triangles of a part are its surface of a name."""
+        return surface_answer(self._part_of_any_unit(asked), str(asked["name"]))
+
+    def _part(self, asked: Any) -> PartMesh:
+        """Return a part of the folder.
+
+        Raises UnknownUnitError if neither its file states its unit, nor `asked` gives it.
+        """
         path, unit = path_inside(self._folder, str(asked["part"])), str(asked["unit"] or STATED)
         if unit not in (*METRES_PER, STATED):
             raise InputError(f"unit: given {unit}; allowed: {', '.join(METRES_PER)}")
-        try:
-            mesh = read_part_cached(path, unit)
-        except UnknownUnitError as error:
-            return {"sizes": error.sizes, "size": "", "names": []}
+        mesh = read_part_cached(path, unit)
         keep_part(mesh, path, mesh.unit)  # a design names the unit, and is opened without a wait
-        names = [[one.name, one.text] for one in named_surfaces(mesh)[:MOST_NAMES]]
-        return {"sizes": {}, "size": format_box(mesh.size), "names": names}
+        return mesh
+
+    def _part_of_any_unit(self, asked: Any) -> PartMesh:
+        try:
+            return self._part(asked)
+        except UnknownUnitError as error:  # its form is the same in each
+            return self._part({**asked, "unit": next(iter(error.sizes))})
 
     def propose(self, asked: Any) -> dict[str, object]:
         """Start the command `new` for a part of the folder, and return its status."""

@@ -215,7 +215,7 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
     Raises:
         InputError: there is no surface of that name.
     """
-    chosen = {one.name: one for one in (_find(mesh, known, name) for name in wanted)}
+    chosen = {one.name: one for one in (find_surface(mesh, known, name) for name in wanted)}
     if chosen:
         whole = [one for one in chosen.values() if one.keys == WHOLE and one.triangles.all()]
         return _joined(whole or list(chosen.values()), "as asked (--target)")
@@ -348,7 +348,14 @@ def _count(surface: Surface) -> int:
     return int(re.match(r"\d+", surface.text)[0])  # type: ignore[index]
 
 
-def _find(mesh: PartMesh, known: Sequence[Surface], name: str) -> Surface:
+def find_surface(mesh: PartMesh, known: Sequence[Surface], name: str) -> Surface:
+    """Return the surface of a name, such as "face 3" or "face 3.1".
+
+    Args:
+        known: all surfaces of `surfaces`.
+    Raises:
+        InputError: there is none of this name.
+    """
     alike = [one for one in known if one.name.lower() == name.lower()]
     if alike:
         return min(alike, key=lambda one: one.name != name)

@@ -1,6 +1,7 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
-import { ask, attempt, element, onPage, warning, wordsOf } from "./state.js";
+import { ask, attempt, element, onPage, unpack, warning, wordsOf } from "./state.js";
 import { followed, sinceBegin, stage } from "./steps.js";
+import { lights } from "./surfaces.js";
 
 const find = (id) => document.getElementById(id);
 const option = (one) => element("option", { value: [one].flat()[0], textContent: [one].flat().at(-1) }); // a text, or a pair with its words
@@ -36,13 +37,37 @@ async function open(design) {
   location.reload();
 }
 
+const view = new View3D(find("view"));
+let drawnPart = "", pointed = "";
+
+// Draw the part beside its size, where the names of its surfaces are pointed at.
+async function draw(part) {
+  find("place").append(find("view"));
+  find("place").hidden = !part;
+  if (part === drawnPart) return;
+  view.remove("part");
+  drawnPart = part;
+  if (!part) return;
+  const seen = unpack(await ask("/view", { part, unit: known.unit }));
+  if (part !== drawnPart) return;
+  view.kinds = seen.kinds;
+  pointed = seen.pointed;
+  view.surface("part", { points: seen.points, triangles: seen.triangles, kind: "rest", open: !seen.closed });
+  const { low, high } = view.extent(), size = Math.hypot(...high.map((x, i) => x - low[i]));
+  const middle = low.map((x, i) => (x + high[i]) / 2), way = [0.49, -0.79, 0.35];
+  view.look({ middle, eye: middle.map((x, i) => x + 2 * size * way[i]), size });
+  document.body.dataset.drawn = part;
+}
+view.renderer.domElement.addEventListener("dblclick", () => { if (view.home) view.look(view.home); });
+const shows = (named, name) => lights(named, view, () => ask("/face", { part: known.part, unit: known.unit, name }), () => pointed);
+
 // Read a part, to say its size, and to ask for its unit where the file states none.
 async function look(part, unit = "") {
   Object.assign(known, { part, unit });
   find("propose").disabled = find("sizes").hidden = find("names").hidden = true;
   find("known").textContent = part ? `reading ${part} …` : "";
   document.body.dataset.known = "";
-  if (!part) return;
+  if (!part) { draw(""); return; }
   try {
     const seen = await ask("/look", { part, unit });
     if (known.part !== part || known.unit !== unit) return;
@@ -55,10 +80,11 @@ async function look(part, unit = "") {
     }));
     find("names").hidden = !seen.names.length;
     find("names").replaceChildren(find("names").firstElementChild, ...seen.names.map(([name, text]) =>
-      element("label", {}, element("input", { type: "checkbox", value: name }), ` ${name}: ${text}`)));
+      shows(element("label", {}, element("input", { type: "checkbox", value: name }), ` ${name}: ${text}`), name)));
     find("known").textContent = sizes.length ? "" : `${part} measures ${seen.size}.`;
     find("propose").disabled = sizes.length > 0;
     document.body.dataset.known = sizes.length ? "sizes" : "all";
+    await draw(part);
   } catch (error) {
     find("known").textContent = "";
     throw error;
@@ -116,8 +142,9 @@ function showProposal({ sentence, rows, matters, choices }, design) {
     const title = [place && `at ${place} mm in the part's file`, alone].filter(Boolean).join("; ");
     const button = element("button", { title, ariaPressed: String(is_target) }, name, element("small", { textContent: ` ${text}` }));
     button.addEventListener("click", () => attempt(() => propose([name])));
-    return button;
+    return known.part ? shows(button, name) : button;
   }));
+  if (known.part) find("of-choices").prepend(find("view"));
   find("open-made").onclick = () => attempt(() => open(design));
 }
 

@@ -1,6 +1,7 @@
 // Choosing the target and zones by clicking faces, or by names of the file, and turning a face down.
 import { ask, attempt, change, element, say, state } from "./state.js";
 import { seeThrough, setHandles, triangleAt, view } from "./scene.js";
+import { lights } from "./surfaces.js";
 
 const find = (id) => document.getElementById(id);
 const KEYS = ["surface", "faces", "direction", "angle_deg", "box_mm", "radius_mm"];
@@ -12,6 +13,7 @@ export function fillTarget() {
   find("names").replaceChildren(...fillTarget.part.names.map(([name, text]) => {
     const button = element("button", { textContent: name, title: "add it, or take it away, as a click does" });
     button.addEventListener("click", () => choose(name));
+    lights(button, view, () => ask("/surface", { name }), () => fillTarget.part.pointed);
     return element("li", {}, button, ` ${text}`);
   }));
   if (!fillTarget.part.names.length) find("names").append(element("li", { textContent: "none" }));

@@ -4,16 +4,19 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from chamberopt.chamber.part import preview_part
+from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
-from chamberopt.page.answers import part_answer, shape_answer, step_texts
+from chamberopt.geometry.triangles import unit_normals
+from chamberopt.page.answers import part_answer, shape_answer, step_texts, surface_answer
 from tests.chamberopt.chamber.test_target import design_of
 
 
 def test_each_triangle_has_the_number_of_its_name(tmp_path: Path) -> None:
     design = design_of(tmp_path, {})
-    answer = part_answer(design)
+    answer = part_answer(preview_part(design).mesh)
     begin = 4 + int.from_bytes(answer[:4], "little")
     head = json.loads(answer[4:begin])
     kind, count = head["arrays"]["surface"]
@@ -22,6 +25,18 @@ def test_each_triangle_has_the_number_of_its_name(tmp_path: Path) -> None:
     marks = preview_part(design).mesh.groups
     for name in ("Top", "bottom", "left", "right", "ends"):
         assert (np.array(head["groups"])[numbers[marks[name]]] == name).all()
+
+
+def test_the_triangles_of_a_surface_are_those_of_its_name(tmp_path: Path) -> None:
+    """A name of the file, one face of the box between sharp edges, and no name."""
+    mesh = preview_part(design_of(tmp_path, {})).mesh
+    for name, count in (("Top", 2), ("face 1.1", 2)):
+        answer = surface_answer(mesh, name)
+        found = np.frombuffer(answer, "<u4", count, len(answer) - 4 * count)
+        normals = unit_normals(mesh.vertices[mesh.triangles[found]])
+        np.testing.assert_allclose(normals, normals[[0, 0]], atol=1e-12)
+    with pytest.raises(InputError, match="face 99"):
+        surface_answer(mesh, "face 99")
 
 
 def test_each_step_has_its_pose_and_its_share_of_the_time(tmp_path: Path) -> None:

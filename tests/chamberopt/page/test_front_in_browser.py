@@ -21,6 +21,7 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             page.set_input_files("#file", dropped)
             opened.wait("data-known=sizes")  # an STL states no unit
             assert page.locator("#propose").is_disabled()
+            opened.wait("data-drawn='my part.stl'")  # before its unit is known
             page.click("#sizes button >> text=in mm)")
             opened.wait("data-known=all")
             expect(page.locator("#known")).to_contain_text("my part.stl measures 16 x 16 x 16 mm")
@@ -40,6 +41,13 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             shown = page.locator("#rows tr", has_text="Balls")
             expect(shown).to_contain_text("1.2 mm")
             expect(page.locator("#choices button[aria-pressed=true]")).to_contain_text("face 1")
+            side = page.locator("#choices button", has_text="face 1").first
+            before = page.locator("#view").screenshot()
+            side.hover()
+            expect(page.locator("#view")).to_have_attribute("data-highlight", "12")  # triangles
+            assert page.locator("#view").screenshot() != before
+            page.mouse.move(0, 0)
+            expect(page.locator("#view")).not_to_have_attribute("data-highlight", "12")
             page.reload()
             opened.wait('data-ended="0"')
             expect(page.locator("#sentence")).to_contain_text("my part.stl")

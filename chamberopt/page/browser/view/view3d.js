@@ -138,6 +138,23 @@ class View3D {
     return mesh;
   }
 
+  // Mark triangles of a surface, also where they are hidden; null for none.
+  highlight(name, triangles, colour) {
+    this.remove("highlight");
+    const mesh = this.get(name);
+    if (!mesh || !triangles) { delete this.element.dataset.highlight; return; }
+    this.element.dataset.highlight = triangles.length;
+    const { points, index } = mesh.userData, own = new Uint32Array(3 * triangles.length);
+    triangles.forEach((k, i) => own.set(index.subarray(3 * k, 3 * k + 3), 3 * i));
+    const marked = this.surface("highlight", { points, triangles: own, opacity: 0.8 });
+    marked.material.color.set(colour);
+    Object.assign(marked.material, { depthTest: false });
+    marked.renderOrder = 1;
+    marked.matrixAutoUpdate = false;
+    marked.matrix.copy(mesh.matrix);
+    marked.matrixWorldNeedsUpdate = true;
+  }
+
   // Names and surfaces, lines and texts.
   all() { return [...this.#meshes].map(([name, { mesh }]) => [name, mesh]); }
 
