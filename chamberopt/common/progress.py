@@ -1,7 +1,8 @@
 """Show on stderr how far a command has come: its named steps with counts and time left.
 
 After `write_json_lines` each step writes lines of JSON, for a program to read: {"step": name,
-"done": 3, "total": 20, "best": 0.81}, and at its end {"step": name, "ended": true}.
+"done": 3, "total": 20, "best": 0.81}, and at its end {"step": name, "ended": true}. What a command
+knows before its end is a line too, such as {"draft": {...}} of a proposal.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from importlib.util import find_spec
@@ -33,6 +34,12 @@ def write_json_lines() -> None:
     """Make all later steps write their progress as lines of JSON."""
     global _json_lines
     _json_lines = True
+
+
+def tell_program(name: str, known: Mapping[str, object]) -> None:
+    """Write what is known so far as a line of JSON, where a program reads those of steps."""
+    if _json_lines and not _is_quiet:
+        print(json.dumps({name: known}), file=sys.stderr, flush=True)
 
 
 @contextmanager

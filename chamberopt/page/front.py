@@ -67,7 +67,7 @@ class Front:
         """Return what the pages show of the command.
 
         Of one that proposes a chamber it is also the picture that there is by now, and the proposal
-        in the words of the page.
+        in the words of the page: before the pilots have ended a draft.
         """
         now = self.command.status()
         if not str(now.get("command", "")).startswith(PROPOSING):
@@ -75,7 +75,7 @@ class Front:
         picture = self._folder / str(now["result"]) / PICTURE
         with suppress(OSError):  # there is none yet
             now["picture"] = f"{now['result']}/{PICTURE}", picture.stat().st_mtime
-        return now | {"proposal": _on_page(now["answer"])}
+        return now | {"proposal": _on_page(now["answer"] or now["draft"])}
 
     def stop(self, _: object) -> dict[str, object]:
         self.command.stop()

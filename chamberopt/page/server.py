@@ -133,8 +133,8 @@ SHOWN_FILES = {".html": "text/html", ".pdf": "application/pdf", ".png": "image/p
 OF_FRONT = "look", "view", "face", "propose", "open", "close", "stop"
 LOOKS_OF_FRONT = "front", "status"
 OF_DESIGN = (
-    "read", "part", "surface", "fields", "structure", "step", "remove", "shape", "cavity", "reach", "pick",
-    "save", "study", "start", "shown", "candidates", "candidate", "model", "resume", "more",
+    "read", "part", "surface", "fields", "structure", "step", "remove", "shape", "cavity", "reach",
+    "pick", "save", "study", "start", "shown", "candidates", "candidate", "model", "resume", "more",
 )  # fmt: skip
 LOOKS_OF_DESIGN = ("results",)
 CLOSED = "no design is open here any more: reload the page"

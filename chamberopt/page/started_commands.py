@@ -34,6 +34,7 @@ class StartedCommand:
         self._lines: list[str] = []
         self._answer: list[str] = []  # lines of JSON, of a command that was asked for JSON
         self._steps: dict[str, dict[str, Any]] = {}
+        self._draft: dict[str, Any] | None = None  # a proposal before its pilots
         self._began = time.monotonic()
         self._process = start_python(
             COMMAND,
@@ -62,7 +63,7 @@ class StartedCommand:
         The value `exit` is the exit status of the command, or None while it runs. `result` is the
         folder of the result that it will leave, if any. Its warnings, and its lines where it
         failed, are in the words of the page too. `answer` is what a command that was asked for JSON
-        has answered, or None.
+        has answered, or None. `draft` is a proposal before its pilots, while the command runs.
         """
         code = self._process.poll()
         if code is not None:
@@ -79,6 +80,7 @@ class StartedCommand:
             "warnings": [on_page(text) for text in warnings],
             "fault": [on_page(text) for text in lines] if code else [],
             "exit": code,
+            "draft": self._draft if code is None else None,
             "answer": json.loads("".join(self._answer)) if self._answer and code == 0 else None,
         }
 
@@ -107,18 +109,20 @@ class StartedCommand:
     def _read(self, stream: IO[str], lines: list[str]) -> None:
         """Take the lines that the command prints to a stream until its end, its steps apart."""
         for line in stream:
-            step = _step(line)
-            if step is None:
+            told = _told(line)
+            if told is None:
                 lines.append(line.rstrip("\n"))
-            elif step.get("ended"):
-                self._steps.pop(step["step"], None)
+            elif "draft" in told:
+                self._draft = told["draft"]
+            elif told.get("ended"):
+                self._steps.pop(told["step"], None)
             else:
-                self._steps[step["step"]] = step
+                self._steps[told["step"]] = told
 
 
-def _step(line: str) -> dict[str, Any] | None:
-    """Return the progress that a command prints as a line of JSON, or None for other lines."""
-    if not line.startswith('{"step"'):
+def _told(line: str) -> dict[str, Any] | None:
+    """Return what a command prints for a program as a line of JSON, or None for other lines."""
+    if not line.startswith(('{"step"', '{"draft"')):
         return None
     try:
         return dict(json.loads(line))

@@ -87,10 +87,12 @@ def new(
     """
     from chamberopt.chamber.propose.first_design import propose
     from chamberopt.chamber.propose.proposal import Wanted
+    from chamberopt.chamber.propose.proposed_mask import find_left_out
     from chamberopt.chamber.propose.shop import load_shop
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.errors import InputError
     from chamberopt.common.files import claim_folder
+    from chamberopt.common.progress import tell_program
     from chamberopt.documents.proposal import proposal_in_words, proposal_lines
     from chamberopt.geometry.meshes.units import STATED, UnknownUnitError
     from chamberopt.workflows.propose import (
@@ -137,6 +139,8 @@ def new(
         wishes = replace(wishes, geometry=wanted)
         made = propose(part, wanted, choose)
 
+    if pilot:  # which take minutes, and may change it
+        tell_program("draft", asdict(proposal_in_words(made, find_left_out(made))))
     done = write_proposal(made, part, wishes, choose, out, teller)
     words = proposal_in_words(done.made, done.left_out)
     if not json:

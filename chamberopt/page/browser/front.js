@@ -109,7 +109,7 @@ find("file").addEventListener("change", () => attempt(() => bring(find("file").f
 find("part").addEventListener("change", () => attempt(() => look(find("part").value)));
 
 // Show the command that proposes a chamber: how far it is, and in the end what it proposes.
-let drawn = 0; // when the picture that is shown was drawn
+let drawn = 0, told = ""; // when the picture that is shown was drawn; the proposal that is shown
 function tell({ steps, seconds, lines, warnings, fault, exit, picture, result, proposal }) {
   find("made").hidden = false;
   find("stop").hidden = exit !== null;
@@ -128,7 +128,13 @@ function tell({ steps, seconds, lines, warnings, fault, exit, picture, result, p
   find("proposal").hidden = !proposal;
   find("rows").hidden = !proposal;
   find("another").hidden = !proposal || !known.part;
-  if (proposal) showProposal(proposal, `${result}/design.toml`);
+  const isDraft = exit === null, now = JSON.stringify([proposal, result, isDraft]);
+  find("draft").hidden = !isDraft;
+  find("made-end").hidden = isDraft;
+  if (!proposal || now === told) return; // its buttons stay while one is pointed at
+  told = now;
+  showProposal(proposal, `${result}/design.toml`);
+  find("to-settle").hidden ||= isDraft; // what the pilots change is not to be settled
 }
 
 function showProposal({ sentence, rows, matters, choices }, design) {
@@ -177,6 +183,10 @@ async function started(target) {
 
 // Propose a chamber that peens these surfaces, by default the likeliest one.
 async function propose(target) {
+  if (following) { // a draft, of which another surface was chosen
+    await ask("/stop", {});
+    await following;
+  }
   const begun = await started(target);
   if (!begun) return;
   for (const one of ticked()) one.checked = target.includes(one.value);
@@ -187,9 +197,12 @@ async function propose(target) {
 }
 
 // Follow the command that proposes a chamber to its end.
+let following = null;
 async function follow(begun) {
   find("propose").disabled = true;
-  const ended = await followed(tell, begun);
+  following = followed(tell, begun);
+  const ended = await following;
+  following = null;
   find("propose").disabled = !known.part;
   if (ended.exit !== 0) find("made").hidden = besideField(ended.lines.at(-1) ?? "", ended.fault.at(-1));
   else find("open-made").focus({ preventScroll: true });

@@ -142,6 +142,25 @@ def test_a_proposal_that_asks_ends_in_words(front: Served) -> None:
     assert "does not state the unit" in now["lines"][-1]
 
 
+def test_a_draft_is_told_before_the_pilots(front: Served, tmp_path: Path) -> None:
+    """It has the chamber's sizes, and is gone with the command that is stopped."""
+    front.ask("/propose", PROPOSED | {"pilot": True})
+    while (now := json.loads(front.get("/status").read()))["exit"] is None:
+        if now["proposal"]:
+            break
+        time.sleep(0.1)
+    assert now["exit"] is None
+    assert now["answer"] is None
+    rows = {row["name"]: row["value"] for row in now["proposal"]["rows"]}
+    assert "height" in rows["chamber"][0]
+    assert not any("draft" in line for line in now["lines"])
+    front.ask("/stop", {})
+    while (now := json.loads(front.get("/status").read()))["exit"] is None:
+        time.sleep(0.1)
+    assert now["proposal"] is None
+    assert not (tmp_path / "box").exists()
+
+
 def test_the_page_begins_with_the_part_that_is_given(tmp_path: Path) -> None:
     page = Served(tmp_path, "box.stl")
     try:
