@@ -346,6 +346,16 @@ def _refuse_free_edges(design: Design, room: SolidSurface, tags: np.ndarray) -> 
         )
 
 
+def floor_sides_mm(vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray) -> np.ndarray:
+    """Return the sides [mm] along x and y, (2,), of what the floor needs about the axis.
+
+    Args:
+        vertices, triangles, tags: surface of the cavity, and the kind of surface of its triangles.
+    """
+    floor = 1e3 * vertices[np.unique(triangles[tags == TAG_SONOTRODE]), :2]
+    return np.asarray(2.0 * np.abs(floor).max(axis=0))
+
+
 def _refuse_bare_floor(design: Design, room: SolidSurface, tags: np.ndarray) -> None:
     """Raise InputError if the floor is larger than the blocks of which it is made.
 
@@ -356,10 +366,8 @@ def _refuse_bare_floor(design: Design, room: SolidSurface, tags: np.ndarray) -> 
     blocks = design.sonotrode.blocks
     if blocks is None:
         return
-    floor = 1e3 * room.vertices[np.unique(room.triangles[tags == TAG_SONOTRODE]), :2]
-    half = np.abs(floor).max(axis=0)
-    if (half > 0.5 * np.array(blocks.sides_mm) + 1e3 * MIN_HEIGHT).any():
-        x, y = 2.0 * half
+    x, y = floor_sides_mm(room.vertices, room.triangles, tags)
+    if (np.array([x, y]) > np.array(blocks.sides_mm) + 2e3 * MIN_HEIGHT).any():
         raise InputError(
             f"sonotrode.blocks: {blocks.in_words}, but the floor needs {x:.4g} × {y:.4g} mm about "
             "the axis; give more or larger blocks, or a smaller floor"

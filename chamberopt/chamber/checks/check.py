@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.build import NOTED_HIDDEN, TARGET, hidden_share, selection_of, told_of_steps
+from chamberopt.chamber.build import (
+    NOTED_HIDDEN,
+    TARGET,
+    floor_sides_mm,
+    hidden_share,
+    selection_of,
+    told_of_steps,
+)
 from chamberopt.chamber.checks.calibration import calibration_warnings
 from chamberopt.chamber.checks.fillets import facet_warnings, fillet_warnings
 from chamberopt.chamber.checks.gaps import (
@@ -148,6 +155,7 @@ def first_warnings(
     """
     shot = design.shot
     texts = _sonotrode_warnings(design, mesh, turning_axis(design, chamber.part))
+    texts += _block_warnings(design, chamber)
     filled = shot.volume / chamber.volume
     if filled > MAX_PACKING_FRACTION:
         texts.append(
@@ -320,6 +328,27 @@ def _sonotrode_warnings(design: Design, mesh: TriangleMesh, line: Axis | None) -
     return [
         f"the gap between turning part and sonotrode is {below * 1e3:.3g} mm, narrower than a ball "
         f"of {ball * 1e3:g} mm: a ball may be jammed there as the part turns; {remedy}"
+    ]
+
+
+def _block_warnings(design: Design, chamber: Chamber) -> list[str]:
+    """Return a warning if the floor is so small that fewer of its blocks carry it.
+
+    A design records no size of a floor that is one sonotrode.
+    """
+    blocks = design.sonotrode.blocks
+    if blocks is None:
+        return []
+    sides = floor_sides_mm(chamber.vertices, chamber.triangles, chamber.tags)
+    columns, rows = np.ceil(sides / np.array(blocks.size_mm) - 1e-6).astype(int)
+    if columns * rows >= blocks.count:
+        return []
+    (x, y), (long, wide) = sides, blocks.sides_mm
+    return [
+        f"the sonotrodes are wider than the floor: {blocks.in_words}, which are {long:g} × {wide:g} "
+        f"mm, and the floor is {x:.4g} × {y:.4g} mm, so that walls stand over their faces; set "
+        f"sonotrode.blocks.columns = {columns} and sonotrode.blocks.rows = {rows}, or enlarge the "
+        "chamber"
     ]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.chamber.checks.check import amplitude_notes
+from chamberopt.chamber.checks.check import amplitude_notes, warnings
 from chamberopt.chamber.scene import build_scene, chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import load_design, save_design
@@ -119,6 +119,10 @@ def test_a_further_sonotrode_bends_about_its_own_middle(rigid) -> None:
         rigid.changed({"sonotrodes": [{**face, "amplitude_profile": profile}]})
 
 
+def block_warnings(design) -> list[str]:
+    return [text for text in warnings(design, build_chamber(design)) if "sonotrodes" in text]
+
+
 def test_a_floor_of_blocks_is_simulated_as_one_face(rigid, mesh) -> None:
     width = rigid.value("chamber.diameter_mm")
     blocks = {"size_mm": [0.5 * width, width], "columns": 2}
@@ -126,6 +130,11 @@ def test_a_floor_of_blocks_is_simulated_as_one_face(rigid, mesh) -> None:
     assert made.sonotrode.blocks.joints_mm == ([0.0], [])
     assert made.sonotrode.blocks.in_words.startswith("2 blocks of")
     np.testing.assert_array_equal(build_chamber(made).vertices, build_chamber(rigid).vertices)
+    assert block_warnings(made) == []
+    large = {"size_mm": [width, width], "columns": 2}
+    (warning,) = block_warnings(rigid.changed({"sonotrode.blocks": large}))
+    assert "wider than the floor: 2 blocks" in warning
+    assert "sonotrode.blocks.columns = 1 and sonotrode.blocks.rows = 1" in warning
     with pytest.raises(InputError, match=r"sonotrode.blocks: 2 blocks .* but the floor needs"):
         build_chamber(rigid.changed({"sonotrode.blocks": {**blocks, "size_mm": [10.0, width]}}))
     with pytest.raises(InputError, match="each of which has its own: not supported"):
