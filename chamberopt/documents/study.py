@@ -153,7 +153,8 @@ def search_section(result: Result, trials: Sequence[Trial]) -> Section | None:
         return None
     label = objective_label(result.objective_name)
     candidates = [evaluated(one, label) for one in trials]
-    figure, tooltips = convergence_figure(candidates, label.with_unit, label.factor < 0.0)
+    smaller = label.factor < 0.0
+    figure, tooltips = convergence_figure(candidates, label.with_unit, smaller, label.most)
     caption = (
         "The objective of every evaluation in its order. The answer rests on the last ones, which "
         "ran on fresh seeds. Point at a mark to see its parameters."
@@ -256,6 +257,7 @@ def influence_section(study: StudyRecord, label: Label) -> Section:
             study.start.parameters,
             study.best.parameters,
             label.with_unit,
+            label.most,
         )
         content += [
             Table("By a model of all evaluations", head, table),

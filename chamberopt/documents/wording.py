@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from chamberopt.common import number_text
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text
-from chamberopt.coverage.metrics import OBJECTIVES, find_metric, is_number, parse_objective
+from chamberopt.coverage.metrics import (
+    OBJECTIVES,
+    find_metric,
+    highest_objective,
+    is_number,
+    parse_objective,
+)
 from chamberopt.documents.document import Table
 
 if TYPE_CHECKING:
@@ -28,12 +34,14 @@ class Label:
         factor: shown number divided by stored number, e.g. 100 for per cent. Negative if the
             objective is a negative multiple of a metric.
         meaning: explanation, if the text needs any.
+        most: largest number that can be shown, such as 100 for per cent.
     """
 
     text: str
     unit: str = ""
     factor: float = 1.0
     meaning: str = ""
+    most: float = math.inf
 
     @property
     def in_full(self) -> str:
@@ -67,7 +75,7 @@ def metric_label(name: str) -> Label:
     if metric is None:
         return Label(name if is_number(name) else name.replace("_", " "))
     if name.endswith("_coverage"):
-        return Label(metric.summary, "%", 100.0)
+        return Label(metric.summary, "%", 100.0, most=100.0)
     return Label(metric.summary, "" if metric.unit == "balls" else metric.unit)  # "number of balls"
 
 
@@ -83,10 +91,11 @@ def objective_label(name: str) -> Label:
     (metric, weight), *others = objective.terms.items()
     if not others and weight:
         label = metric_label(metric)
-        return Label(label.text, label.unit, label.factor / weight)
+        return replace(label, factor=label.factor / weight)
+    most = highest_objective(name, 1.0)
     if name in OBJECTIVES:
-        return Label(name.replace("_", " "), meaning=objective.summary)
-    return Label("weighted sum", meaning=_sum_text(objective.terms))
+        return Label(name.replace("_", " "), meaning=objective.summary, most=most)
+    return Label("weighted sum", meaning=_sum_text(objective.terms), most=most)
 
 
 def _sum_text(terms: Mapping[str, float]) -> str:

@@ -87,7 +87,8 @@ def candidates_answer(folder: Path) -> dict[str, object]:
         ],
         "candidates": rows,
         "best": list(zip(numbers, best, strict=True)),
-        "range": value_range(objectives) if objectives else [0.0, 1.0],
+        "range": value_range(objectives, labels[0].most) if objectives else [0.0, 1.0],
+        "most": [one.most if math.isfinite(one.most) else None for one in labels],
         "front": _front(trials) if len(labels) > 1 else [],
         "colours": COLOURS,
     }

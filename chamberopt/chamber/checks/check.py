@@ -345,7 +345,7 @@ def _block_warnings(design: Design, chamber: Chamber) -> list[str]:
         return []
     (x, y), (long, wide) = sides, blocks.sides_mm
     return [
-        f"the sonotrodes are wider than the floor: {blocks.in_words}, which are {long:g} × {wide:g} "
+        f"the sonotrodes are wider than the floor: {blocks.in_words}, together {long:g} × {wide:g} "
         f"mm, and the floor is {x:.4g} × {y:.4g} mm, so that walls stand over their faces; set "
         f"sonotrode.blocks.columns = {columns} and sonotrode.blocks.rows = {rows}, or enlarge the "
         "chamber"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
@@ -98,11 +99,14 @@ def name_choices(axis: Axis, texts: Sequence[str]) -> None:
         axis.set_ticks(range(len(texts)), texts)
 
 
-def value_range(estimates: Sequence[Estimate]) -> tuple[float, float]:
+def value_range(estimates: Sequence[Estimate], most: float = math.inf) -> tuple[float, float]:
     """Return axis limits that show all values, and intervals unless they are very wide.
 
     Wide intervals, for example of a time that may be infinite, would flatten everything else. They
     are cut off where they extend beyond the values by more than the span of the values.
+
+    Args:
+        most: the largest value that is possible, such as 1 for a share: the axis ends there.
     """
     values = np.array([one.value for one in estimates])
     half_widths = np.array([one.half_width for one in estimates])
@@ -111,7 +115,13 @@ def value_range(estimates: Sequence[Estimate]) -> tuple[float, float]:
     shown = np.minimum(half_widths, span) if span > 0.0 else half_widths
     low, high = float((values - shown).min()), float((values + shown).max())
     margin = 0.05 * (high - low) or 0.5
-    return low - margin, high + margin
+    return low - margin, min(high + margin, most)
+
+
+def keep_below(axes: Axes, most: float) -> None:
+    """Let the upright axis of a chart end at the largest value that is possible, such as 1."""
+    if axes.get_ylim()[1] > most:
+        axes.set_ylim(top=most)
 
 
 def literal(text: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from textwrap import fill
@@ -12,10 +13,12 @@ import numpy as np
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.key_words import title_with_unit
 from chamberopt.common.number_text import estimate_text, plain
+from chamberopt.coverage.metrics import highest_objective
 from chamberopt.pictures.charts.colours import BLUE, GREEN, GREY, ORANGE
 from chamberopt.pictures.charts.figure_style import (
     SMALL,
     TITLE,
+    keep_below,
     literal,
     name_choices,
     new_figure,
@@ -71,7 +74,8 @@ def convergence_picture(path: Path, result: StudyResult) -> None:
     figure = new_figure(11.0, 4.2 + 3.0 * rows)
     grid = figure.add_gridspec(rows + 1, columns, height_ratios=[1.35, *[1.0] * rows])
     axes = figure.add_subplot(grid[0, :])
-    draw_convergence(axes, candidates, y_label)
+    most = highest_objective(result.study.objective.goals[0], 1.0)
+    draw_convergence(axes, candidates, y_label, most=most)
     start, best = (one.evaluation.objective for one in (result.start, result.best))
     axes.axhline(start.value, color=ORANGE, lw=1.2, ls="--", label="start, as confirmed")
     axes.set_title(
@@ -88,6 +92,7 @@ def convergence_picture(path: Path, result: StudyResult) -> None:
     for i, name in enumerate(names):
         axes = figure.add_subplot(grid[1 + i // columns, i % columns], sharey=first)
         _draw_parameter(axes, result, candidates, name)
+        keep_below(axes, most)
         if i % columns == 0:
             axes.set_ylabel(y_label)
         else:
@@ -101,11 +106,15 @@ def draw_convergence(
     candidates: Sequence[EvaluatedCandidate],
     y_label: str,
     smaller_is_better: bool = False,
+    most: float = math.inf,
 ) -> dict[str, list[str]]:
     """Draw the objective of every evaluation in its order, with 95 % intervals.
 
     The best candidate so far and the confirmations (second evaluations) of candidates are drawn
     too.
+
+    Args:
+        most: the largest value of the objective that is possible.
 
     Returns:
         Tooltips for svg_text: value and parameters of each point, by the gid (id) of the line.
@@ -142,7 +151,7 @@ def draw_convergence(
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlim(0.5, last)
     if shown := [one.objective for one in (*evaluated, *confirmed) if one.objective]:
-        axes.set_ylim(*value_range(shown))
+        axes.set_ylim(*value_range(shown, most))
     style_axes(axes, "evaluation", y_label)
     return tooltips
 
@@ -227,6 +236,7 @@ def slices_picture(path: Path, result: StudyResult, sensitivity: Sensitivity) ->
         result.best.parameters,
         f"loses no more than {sensitivity.noise:.2g}",
         readable(result.study.objective.goals[0]),
+        highest_objective(result.study.objective.goals[0], 1.0),
     )
     save_picture(figure, path)
 
@@ -237,6 +247,7 @@ def slices_figure(
     best: Mapping[str, float | str],
     flat_label: str,
     y_label: str,
+    most: float = math.inf,
 ) -> Figure:
     """Return charts of the objective over each parameter, as the study's model predicts it.
 
@@ -248,6 +259,7 @@ def slices_figure(
         slices: predictions over each parameter.
         start, best: parameter values of the unchanged and of the best design.
         flat_label: legend for the shaded range of a parameter.
+        most: the largest value of the objective that is possible.
     """
     columns = min(len(slices), MAX_COLUMNS)
     rows = -(-len(slices) // columns)
@@ -281,6 +293,7 @@ def slices_figure(
         style_axes(axes, literal(title_with_unit(one.name)))
     for axes in panels[len(slices) :]:
         axes.set_visible(False)
+    keep_below(panels[0], most)
     panels[0].set_ylabel(y_label)
     found = [axes.get_legend_handles_labels() for axes in panels[: len(slices)]]
     legend = {label: one for pair in found for one, label in zip(*pair, strict=True)}
@@ -330,8 +343,9 @@ def pareto_picture(path: Path, result: StudyResult) -> None:
         ]
         for k in (0, 1)
     )
-    axes.set_xlim(*value_range(x_goals))
-    axes.set_ylim(*value_range(y_goals))
+    x_most, y_most = (highest_objective(one, 1.0) for one in result.study.objective.goals)
+    axes.set_xlim(*value_range(x_goals, x_most))
+    axes.set_ylim(*value_range(y_goals, y_most))
     x_name, y_name = map(readable, result.study.objective.goals)
     style_axes(axes, f"{x_name}, better to the right", f"{y_name}, better upwards")
     axes.legend(fontsize=SMALL, frameon=False)
@@ -339,12 +353,15 @@ def pareto_picture(path: Path, result: StudyResult) -> None:
 
 
 def convergence_figure(
-    candidates: Sequence[EvaluatedCandidate], y_label: str, smaller_is_better: bool
+    candidates: Sequence[EvaluatedCandidate],
+    y_label: str,
+    smaller_is_better: bool,
+    most: float = math.inf,
 ) -> tuple[Figure, dict[str, list[str]]]:
     """Return a chart of the objective of every evaluation in order, and tooltips for it."""
     figure = new_figure(*WIDE)
     axes = figure.subplots()
-    tooltips = draw_convergence(axes, candidates, fill(y_label, Y_LABEL), smaller_is_better)
+    tooltips = draw_convergence(axes, candidates, fill(y_label, Y_LABEL), smaller_is_better, most)
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=5, fontsize=SMALL, frameon=False)
     return figure, tooltips
@@ -355,6 +372,7 @@ def influence_figure(
     start: Mapping[str, float | str],
     best: Mapping[str, float | str],
     y_label: str,
+    most: float = math.inf,
 ) -> Figure:
     """Return charts of the objective that the study's model predicts over each parameter.
 
@@ -363,4 +381,4 @@ def influence_figure(
         start, best: parameter values of the unchanged and of the best design.
     """
     label = fill(y_label, Y_LABEL)
-    return slices_figure(slices, start, best, "loses no more than the noise", label)
+    return slices_figure(slices, start, best, "loses no more than the noise", label, most)

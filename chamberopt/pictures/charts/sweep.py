@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.number_text import estimate_text
+from chamberopt.coverage.metrics import highest_objective
 from chamberopt.pictures.charts.colours import BLUE, COVERAGE_MAP, GREY, ORANGE
 from chamberopt.pictures.charts.figure_style import (
     SMALL,
     TITLE,
+    keep_below,
     name_choices,
     new_figure,
     readable,
@@ -86,6 +88,7 @@ def _draw_curve(axes: Axes, sweep: SweepResult, name: str) -> None:
             axes.errorbar(x, y, yerr=half_width, fmt=line, ms=5, lw=1, color=colour, label=label)
     axes.axvline(_start(sweep, name), color=ORANGE, lw=1, ls="--", label="the design as it is")
     name_choices(axes.xaxis, sweep.study.vary[name].texts)
+    keep_below(axes, highest_objective(sweep.study.objective.goals[0], 1.0))
     style_axes(axes, name, readable(sweep.study.objective.goals[0]))
     axes.legend(fontsize=SMALL, frameon=False)
 

@@ -14,9 +14,9 @@ export function ticks(low, high, count) {
   return Array.from({ length: Math.max(0, last - first + 1) }, (_, k) => Number(((first + k) * step).toPrecision(12)));
 }
 
-// An axis: { label, low, high, texts }; the values of a choice are its texts.
-export function scaleOf({ low, high, texts = [] }, from, to, margin = 0) {
-  const room = texts.length ? 0.3 : margin * (high - low), a = low - room, b = high + room;
+// An axis: { label, low, high, texts, most }; the values of a choice are its texts, and none is larger than `most`.
+export function scaleOf({ low, high, texts = [], most = null }, from, to, margin = 0) {
+  const room = texts.length ? 0.3 : margin * (high - low), a = low - room, b = Math.min(high + room, most ?? Infinity);
   const scale = (value) => {
     const place = typeof value === "string" ? texts.indexOf(value) : value; // no place for a number that a shape has not
     return typeof value === "string" && place < 0 ? null : from + (to - from) * (b > a ? (place - a) / (b - a) : 0.5);

@@ -135,10 +135,10 @@ function overAll() {
 }
 
 function front() {
-  const both = searched().filter((one) => one.second), [first, second] = data.objectives;
+  const both = searched().filter((one) => one.second);
   if (both.length < 2) return [];
-  const axis = (values, label) => ({ name: label, low: Math.min(...values), high: Math.max(...values), label });
-  const plot = new Plot({ width: wide(), height: 300, x: axis(both.map((one) => one.objective[0]), first), y: axis(both.map((one) => one.second[0]), second), title: "one objective against the other" });
+  const axis = (k, values) => ({ name: data.objectives[k], label: data.objectives[k], low: Math.min(...values), high: Math.max(...values), most: data.most[k] });
+  const plot = new Plot({ width: wide(), height: 300, x: axis(0, both.map((one) => one.objective[0])), y: axis(1, both.map((one) => one.second[0])), title: "one objective against the other" });
   plot.line(data.front.map((number) => data.candidates[number - 1]).map((one) => [one.objective[0], one.second[0]]), data.colours.confirmed, { "stroke-dasharray": "5 3" });
   for (const one of both) plot.candidate(one, one.objective[0], one.second, mark(one));
   return [title("The Pareto front"), figure("One objective against the other; the line joins the candidates that no other beats in both, as searched.", plot.drawing)];
