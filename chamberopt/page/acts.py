@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from itertools import count, islice, product
+from itertools import count, product
 from pathlib import Path
 from typing import Any
 
@@ -48,12 +48,12 @@ from chamberopt.printers import terminal
 from chamberopt.printers.html import section
 from chamberopt.printers.report_page import REPORT, parts_content, viewer
 from chamberopt.printers.sheet_page import SHEET
-from chamberopt.results.compare.comparison import compare
-from chamberopt.results.load import load_result, load_start
+from chamberopt.results.compare.comparison import compare, differing_values
+from chamberopt.results.load import Result, load_result, load_start
 from chamberopt.search.study import load_study
 from chamberopt.search.study_folder import STUDY, is_finished, is_study_folder, read_inputs
 
-MOST_NUMBERS = 6  # by which results differ, in the line of each
+MOST_VALUES = 6  # by which results differ, in the line of each
 DEEPEST = 4  # levels of folders below the design's folder that are searched for results
 
 
@@ -66,7 +66,7 @@ def list_results(folder: Path) -> list[dict[str, object]]:
     for depth, name in product(range(1, DEEPEST + 1), (INPUTS, RESULT)):
         for file in folder.glob("/".join(["*"] * depth + [name])):
             found[file.parent] = max(found.get(file.parent, 0.0), file.lstat().st_mtime)
-    rows, designs = [], {}
+    rows, results = [], {}
     for where in sorted(found, key=lambda one: found[one], reverse=True):
         if not where.resolve().is_relative_to(folder):
             continue  # a link to elsewhere
@@ -75,40 +75,42 @@ def list_results(folder: Path) -> list[dict[str, object]]:
         row["is_study"] = is_study_folder(where)
         try:
             result = load_result(where)
-            designs[row["folder"]] = _numbers(result.design)
+            results[row["folder"]] = result
             row["text"] = on_average(result)
         except InputError as error:
             unfinished = row["is_study"] and not is_finished(where)
             row["text"] = "a study that has not finished" if unfinished else str(error)
             row["unusable"] = True
         rows.append(row)
-    differing = _differing([*designs.values()])
+    words = dict(zip(results, _differences([*results.values()]), strict=True))
     for row in rows:
-        own = designs.get(row["folder"], {})
-        words = [
-            f"{inner_first(name)} {f'{plain(own[name])} {unit_of(name)}'.rstrip()}"
-            for name in differing
-            if name in own
-        ]
-        row["text"] = "; ".join([", ".join(words)] * bool(words) + [row["text"]])
+        row["text"] = "; ".join(filter(None, (words.get(row["folder"]), row["text"])))
     return rows
 
 
-def _numbers(design: Design) -> dict[str, float]:
-    """Return the numbers that a design has by their dotted names, but for its accuracy."""
-    found = {}
-    for name in design.numbers():
-        if not name.startswith("process.accuracy."):
-            with suppress(InputError):  # one that is not set
-                found[name] = design.value(name)
-    return found
+def _differences(results: Sequence[Result]) -> list[str]:
+    """Return for each result in words the first values by which the results differ.
+
+    Values of the accuracy, and what only tells versions of a shape apart, are left out.
+    """
+    found = differing_values(results)
+    names = [name for name in found if "." in name and not name.startswith("process.accuracy.")]
+    return [
+        ", ".join(
+            f"{inner_first(name)} {f'{_value(found[name][k])} {unit_of(name)}'.rstrip()}"
+            for name in names[:MOST_VALUES]
+            if found[name][k] is not None
+        )
+        for k in range(len(results))
+    ]
 
 
-def _differing(designs: Sequence[Mapping[str, float]]) -> list[str]:
-    """Return the first names of numbers that are not the same in all designs."""
-    names = dict.fromkeys(name for one in designs for name in one)
-    found = (name for name in names if len({one.get(name) for one in designs}) > 1)
-    return [*islice(found, MOST_NUMBERS)]
+def _value(given: object) -> str:
+    if isinstance(given, list | tuple):
+        return ", ".join(map(_value, given))
+    if isinstance(given, bool):
+        return "yes" if given else "no"
+    return plain(given) if isinstance(given, int | float) else str(given)
 
 
 def shown(folders: Sequence[Path]) -> dict[str, object]:

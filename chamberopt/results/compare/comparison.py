@@ -201,7 +201,7 @@ def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison
     return Comparison(
         results=tuple(results),
         labels=tuple(names),
-        parameters=_differing_values(results),
+        parameters=differing_values(results),
         metrics=metrics,
         differences={
             name: tuple(_difference(name, first, other, confidence) for other in results[1:])
@@ -267,7 +267,7 @@ def labels(paths: Sequence[Path]) -> tuple[str, ...]:
     return tuple(f"{path.name} ({i})" for i, path in enumerate(resolved, start=1))
 
 
-def _differing_values(results: Sequence[Result]) -> dict[str, tuple[object, ...]]:
+def differing_values(results: Sequence[Result]) -> dict[str, tuple[object, ...]]:
     """Return the design values that differ between the results, by dotted name.
 
     A value that a result lacks is None.

@@ -22,6 +22,7 @@ from chamberopt.design.calibration import Calibration, LawCalibration, Misfit, l
 from chamberopt.design.load import load_design
 from chamberopt.documents.comparison import comparison_end, comparison_lines
 from chamberopt.documents.wording import metric_label
+from chamberopt.page.acts import list_results
 from chamberopt.printers import terminal
 from chamberopt.results.arrays_file import ResultArrays
 from chamberopt.results.command_records import difference_record
@@ -140,6 +141,9 @@ def test_what_differs_is_named_and_measured(tmp_path: Path) -> None:
     assert both.parameters["shot.mass_g"] == (PLATE.shot.mass_g, 6.0)
     assert set(both.parameters) == {"shot.mass_g", "process.seed"}
     assert both.labels == ("light", "heavy")
+    lines = {row["folder"]: row["text"] for row in list_results(tmp_path)}  # of the page
+    assert str(lines["heavy"]).startswith("mass of the shot 6 g, seed of the process 2; ")
+    assert str(lines["light"]).startswith(f"mass of the shot {PLATE.shot.mass_g:g} g, seed")
     first, second = both.metrics["mean_coverage"]
     (gap,) = both.differences["mean_coverage"]
     assert gap.value == pytest.approx(second.value - first.value)
