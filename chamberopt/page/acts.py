@@ -33,7 +33,7 @@ from chamberopt.page.answers import part_answer, shape_answer, step_texts, surfa
 from chamberopt.page.checker import Checker
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
-from chamberopt.page.page_words import on_page
+from chamberopt.page.page_words import amplitudes_named, balls_named, on_page
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
 from chamberopt.page.structure import (
@@ -394,8 +394,28 @@ def _told_of(file: EditedFile) -> dict[str, object]:
         "fields": design_fields(file),
         "surfaces": picked_surfaces(design),
         "steps": step_texts(design),
-        "to_settle": [{"text": one, "words": on_page(one)} for one in design.to_settle],
+        "to_settle": [
+            {"text": one, "words": on_page(one), "takes": _taken(design, one)}
+            for one in design.to_settle
+        ],
     }
+
+
+def _taken(design: Design, matter: str) -> list[dict[str, object]]:
+    """Return words, and changes of a design, for balls and amplitudes that a matter names.
+
+    The list is empty for a design of several steps, or with balls of several sizes.
+    """
+    if design.steps or design.shot.diameter_mm is None:
+        return []
+    face = design.sonotrode
+    key = f"sonotrode.{face.amplitude_key}"
+    balls = [(f"balls of {one:g} mm", "shot.diameter_mm", one) for one in balls_named(matter)]
+    waves = [
+        (f"{one:g} µm zero-to-peak", key, face.per_amplitude * one)
+        for one in amplitudes_named(matter)
+    ]
+    return [{"label": f"take {text}", "changes": {at: one}} for text, at, one in balls + waves]
 
 
 def _chosen(design: Design, table: str) -> dict[str, object]:

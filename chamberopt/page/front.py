@@ -26,7 +26,7 @@ from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import METRES_PER, STATED, UnknownUnitError
 from chamberopt.page.acts import Acts, free_folder, path_inside
 from chamberopt.page.answers import part_answer, surface_answer
-from chamberopt.page.page_words import choices, on_page
+from chamberopt.page.page_words import balls_named, choices, on_page
 from chamberopt.page.started_commands import JSON, OneCommand
 from chamberopt.workflows.propose import PICTURE, Wishes
 
@@ -204,7 +204,11 @@ def _on_page(answer: Any) -> dict[str, object] | None:
             if row["name"] != SIMULATED  # with their reasons among the numbers of the design
         ],
         "matters": [
-            {"mark": one["mark"].capitalize(), "text": on_page(one["text"])}
+            {
+                "mark": one["mark"].capitalize(),
+                "text": on_page(one["text"]),
+                "balls": balls_named(one["text"]),
+            }
             for one in answer["matters"]
         ],
         "choices": answer["choices"],

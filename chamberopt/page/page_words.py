@@ -74,6 +74,25 @@ def on_page(text: str) -> Words:
     return [*made, *[text[at:]] * (at < len(text))]
 
 
+# How `new` names balls and an amplitude that would serve (chamber/propose), in mm and µm.
+_BALLS = re.compile(r"([\d.]+) mm would serve|--ball-mm ([\d.]+) takes|balls of about ([\d.]+) mm")
+_AMPLITUDE = re.compile(r"an amplitude of about ([\d.]+) µm zero-to-peak")
+
+
+def balls_named(text: str) -> list[float]:
+    """Return the diameters [mm] of balls that a matter says would serve.
+
+    >>> balls_named("MANY BALLS, some 7,958 under the whole part: 0.7 mm would serve 80%")
+    [0.7]
+    """
+    return list(dict.fromkeys(float(next(filter(None, one))) for one in _BALLS.findall(text)))
+
+
+def amplitudes_named(text: str) -> list[float]:
+    """Return the amplitudes [µm], zero-to-peak, that a matter says would serve."""
+    return list(dict.fromkeys(map(float, _AMPLITUDE.findall(text))))
+
+
 def choices(allowed: tuple[str, ...] | list[str]) -> list[tuple[str, str]]:
     """Return each allowed text with its words on the page."""
     return [(one, CHOICES.get(one, one)) for one in allowed]

@@ -4,7 +4,7 @@ import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import "./study/study.js";
-import { addStep, ask, attempt, change, element, isUnsaved, listen, onPage, read, removeStep, say, showAdded, showStep, state, takeTold, undo, unpack, warning, wordsOf } from "./state.js";
+import { addStep, ask, attempt, change, element, isUnsaved, listen, onPage, read, removeStep, say, showAdded, showStep, state, takeTold, undo, unpack, value, warning, wordsOf } from "./state.js";
 import { lookAnew, setHandles, showCavity, showPart, showShape, showState } from "./scene.js";
 
 const find = (id) => document.getElementById(id);
@@ -123,7 +123,12 @@ function fillSettle() {
   const rows = state.file.to_settle.filter((one) => open.includes(one.text)).map((one) => {
     const done = element("button", { type: "button", textContent: "Settled", title: "take it out of the design" });
     done.addEventListener("click", () => change({ to_settle: open.filter((text) => text !== one.text) }));
-    return element("li", {}, element("span", {}, ...onPage(one.words)), done);
+    const takes = one.takes.map(({ label, changes }) => {
+      const [[name, wanted]] = Object.entries(changes), take = element("button", { type: "button", textContent: label, title: `sets ${name}`, disabled: value(name) === wanted });
+      take.addEventListener("click", () => change(changes));
+      return take;
+    });
+    return element("li", {}, element("span", {}, ...onPage(one.words)), ...takes, done);
   });
   const list = element("ol", {}, ...rows);
   find("settle").replaceChildren(...rows.length ? [element("h2", { textContent: "To be settled before it is built" }), list] : []);

@@ -140,7 +140,7 @@ function tell({ steps, seconds, lines, warnings, fault, exit, picture, result, p
 function showProposal({ sentence, rows, matters, choices }, design) {
   find("sentence").replaceChildren(...onPage(sentence));
   find("to-settle").hidden = !matters.length;
-  find("matters").replaceChildren(...matters.map(({ mark, text }) => element("li", {}, element("b", { textContent: mark }), ...onPage(text))));
+  find("matters").replaceChildren(...matters.map(({ mark, text, balls }) => element("li", {}, element("b", { textContent: mark }), ...onPage(text), ...balls.map(withBalls))));
   find("rows").replaceChildren(...rows.map(({ name, value, reasons }) => element("tr", {},
     element("th", { textContent: name[0].toUpperCase() + name.slice(1) }),
     element("td", {}, element("b", {}, ...onPage(value)), ...reasons.map((words) => element("p", {}, ...onPage(words)))))));
@@ -152,6 +152,17 @@ function showProposal({ sentence, rows, matters, choices }, design) {
   }));
   if (known.part) find("of-choices").prepend(find("view"));
   find("open-made").onclick = () => attempt(() => open(design));
+}
+
+// A button that proposes anew with balls of a size, for the same target.
+function withBalls(size) {
+  const button = element("button", { textContent: `propose with balls of ${size} mm`, hidden: !known.part });
+  button.addEventListener("click", () => attempt(() => {
+    find("more").open = true;
+    find("ball-mm").value = size;
+    return propose(proposed);
+  }));
+  return button;
 }
 
 const WISHES = ["material", "intensity", "coverage", "shop", "calibration", "shot", "ball-mm", "pose", "shape"]; // options of `new`
@@ -182,6 +193,7 @@ async function started(target) {
 }
 
 // Propose a chamber that peens these surfaces, by default the likeliest one.
+let proposed = [];
 async function propose(target) {
   if (following) { // a draft, of which another surface was chosen
     await ask("/stop", {});
@@ -189,6 +201,7 @@ async function propose(target) {
   }
   const begun = await started(target);
   if (!begun) return;
+  proposed = target;
   for (const one of ticked()) one.checked = target.includes(one.value);
   find("made").hidden = false;
   find("made").scrollIntoView({ behavior: "smooth" });

@@ -132,13 +132,17 @@ def test_shape_and_holder_are_chosen_in_words(opened: Page) -> None:
 def test_what_is_settled_is_taken_out_of_the_file(opened: Page) -> None:
     page, file = opened.page, opened.served.folder / "design.toml"
     text = file.read_text()
-    file.write_text(f'to_settle = [\n  "LONG: see",\n  "NOT MASKED: ask",\n]\n{text}')
+    many = "MANY BALLS, some 200 under the whole part: 2.5 mm would serve 80%"
+    file.write_text(f'to_settle = [\n  "{many}",\n  "NOT MASKED: ask",\n]\n{text}')
     page.click("#reload")
     listed = page.locator("#settle li")
     expect(listed).to_have_count(2, timeout=WAIT)
     opened.wait("data-checked=reach")
     assert "to be settled" not in (page.locator("#warnings").text_content() or "")
-    listed.first.locator("button").click()
+    listed.first.get_by_text("take balls of 2.5 mm").click()
+    expect(page.locator('[id="shot.diameter_mm"]')).to_have_value("2.5")
+    page.click("#undo")
+    listed.first.get_by_text("Settled").click()
     expect(listed).to_have_count(1, timeout=WAIT)
     expect(listed).to_contain_text("NOT MASKED: ask")
     opened.saved()
