@@ -33,7 +33,7 @@ from chamberopt.page.answers import part_answer, shape_answer, step_texts, surfa
 from chamberopt.page.checker import Checker
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
-from chamberopt.page.page_words import amplitudes_named, balls_named, on_page
+from chamberopt.page.page_words import amplitudes_named, balls_named, explained, on_page
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
 from chamberopt.page.structure import (
@@ -85,6 +85,7 @@ def list_results(folder: Path) -> list[dict[str, object]]:
     words = dict(zip(results, _differences([*results.values()]), strict=True))
     for row in rows:
         row["text"] = "; ".join(filter(None, (words.get(row["folder"]), row["text"])))
+        row["words"] = on_page(row["text"])
     return rows
 
 
@@ -125,7 +126,7 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
         result = load_result(folders[0])
         html = section(answer_section(result, load_start(result)), viewer) + html
     text = terminal.text(comparison_end(compare(folders), False)) if several else ""
-    return {"content": content, "html": html, "comparison": text}
+    return {"content": content, "html": explained(html), "comparison": text}
 
 
 MOST_FILES = 20  # versions of the design's text that are kept for the pages that read them

@@ -1,12 +1,13 @@
 """Words of the page for keys of files, options of the command line and choices.
 
-What the page shows of a message is a list of texts, in which a key or option is a pair: its words,
-and what it is in a file or on the command line, which the page shows as a tip.
+What the page shows of a message is a list of texts, in which a key, option or term is a pair: its
+words, and a tip. The tip says what a key is in a file or on the command line, or what a term means.
 """
 
 from __future__ import annotations
 
 import re
+from html import escape
 
 from chamberopt.common.key_words import inner_first
 from chamberopt.geometry.meshes.formats import SUFFIXES
@@ -41,6 +42,21 @@ OPTIONS = {
     "no-pilot": "the choice not to simulate",
 }
 KEYS = {"holder.at": "faces of the holder", "mask.at": "faces of the mask"}
+# Terms that not every reader knows, and what they mean (docs/reference/glossary.md).
+TERMS = {
+    "uniform coverage": "mean coverage of the target less its standard deviation: high where the "
+    "coverage is high and the same everywhere",
+    "C0": "rebound speed over impact speed of a hit so slow that the metal does not yield",
+    "v0": "impact speed from which on the metal yields: above it a ball leaves a dent and rebounds "
+    "less",
+    "slow end of friction": "friction is known within a range only; at this end of it the balls "
+    "are slowest, so that the time is the longest",
+    "not resolved": "too few dents were simulated to tell: simulate longer",
+    "replicas": "simulations of the same chamber, each from a random start of its own; how they "
+    "differ gives the interval ±",
+    "x/÷": "times or divided by: 0.1 x/÷ 2 is from 0.05 to 0.2",
+    "most_even": "the study of the most even coverage, the largest mean less its spread",
+}
 _TABLES = (
     "part|chamber|shot|sonotrode|sonotrodes|materials|effects|process|holder|mask|zones|"
     "tolerances|ranges"
@@ -50,19 +66,31 @@ _GUIDE = r"docs/[\w/]+\.md(?:#[\w-]+)?"
 _KEY = re.compile(
     rf"{_GUIDE}|\[(?:{_TABLES})\]|\[{_DOTTED}\]|(?<![\w./]){_DOTTED}|--(?:{'|'.join(OPTIONS)})(?![\w-])"
 )
+_TERM = re.compile(rf"(?<![\w./])(?:{'|'.join(map(re.escape, TERMS))})(?![\w./])")
 _FILES = (".toml", ".json", ".html", ".pdf", ".png", *SUFFIXES)  # "part.stl" is no key
 
 
 def on_page(text: str) -> Words:
     """Return a message of the program with its keys and options in the words of the page.
 
+    A term has its meaning where it stands first.
+
     >>> on_page("raise chamber.height_mm")
     ['raise ', ('height of the chamber', 'chamber.height_mm')]
     """
     made: Words = []
     at = 0
-    for match in _KEY.finditer(text):
+    known: set[str] = set()
+    for match in sorted((*_KEY.finditer(text), *_TERM.finditer(text)), key=lambda one: one.start()):
         found = match[0]
+        if match.start() < at or found in known:
+            continue
+        if found in TERMS:
+            known.add(found)
+            made += [text[at : match.start()]] * (match.start() > at)
+            made.append((found, TERMS[found]))
+            at = match.end()
+            continue
         if found.lower().endswith(_FILES):
             continue
         key = found.strip("[]").removeprefix("effects.")
@@ -72,6 +100,22 @@ def on_page(text: str) -> Words:
         made.append((words, found))
         at = match.end()
     return [*made, *[text[at:]] * (at < len(text))]
+
+
+_SAID = re.compile(r"(<(?:p|td|th|dt|dd|li|caption)\b[^>]*>)([^<]+)")
+
+
+def explained(html: str) -> str:
+    """Return HTML in which each term has its meaning as a tip where it stands first."""
+    known: set[str] = set()
+
+    def with_tip(match: re.Match[str]) -> str:
+        if match[0] in known:
+            return match[0]
+        known.add(match[0])
+        return f'<abbr title="{escape(TERMS[match[0]])}">{match[0]}</abbr>'
+
+    return _SAID.sub(lambda said: said[1] + _TERM.sub(with_tip, said[2]), html)
 
 
 # How `new` names balls and an amplitude that would serve (chamber/propose), in mm and µm.

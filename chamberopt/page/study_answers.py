@@ -73,7 +73,7 @@ def candidates_answer(folder: Path) -> dict[str, object]:
     return {
         "version": now,
         "finished": is_finished(folder),
-        "sentence": tried_sentence(trials),
+        "sentence": " ".join([tried_sentence(trials), *_meanings(labels)]),
         "objectives": [label.with_unit for label in labels],
         "varied": [
             {
@@ -92,6 +92,11 @@ def candidates_answer(folder: Path) -> dict[str, object]:
         "front": _front(trials) if len(labels) > 1 else [],
         "colours": COLOURS,
     }
+
+
+def _meanings(labels: Sequence[Label]) -> list[str]:
+    """Return a sentence for each objective whose name has to be explained."""
+    return [f"The objective is {one.text}: {one.meaning}." for one in labels if one.meaning]
 
 
 def candidate_answer(folder: Path, number: int, design: Design) -> dict[str, object]:

@@ -1,5 +1,5 @@
 // Results below the design's folder: in 3D, one or two side by side, with report and process sheet.
-import { ask, attempt, element } from "./state.js";
+import { ask, attempt, element, onPage } from "./state.js";
 import { start } from "./run.js";
 import { followStudy } from "./study/study.js";
 
@@ -10,7 +10,7 @@ async function refresh() {
   const rows = await ask("/results");
   list.replaceChildren(...rows.map((row) => {
     const tick = element("input", { type: "checkbox", value: row.folder, disabled: Boolean(row.unusable) });
-    const item = element("li", {}, element("label", {}, tick, ` ${row.folder}`), element("small", { textContent: row.text }));
+    const item = element("li", {}, element("label", {}, tick, ` ${row.folder}`), element("small", {}, ...onPage(row.words)));
     if (row.is_study) {
       const button = element("button", { textContent: "see its candidates" });
       button.addEventListener("click", () => { closeResults(); followStudy(row.folder); });

@@ -2,7 +2,7 @@
 
 import pytest
 
-from chamberopt.page.page_words import amplitudes_named, balls_named
+from chamberopt.page.page_words import TERMS, amplitudes_named, balls_named, explained, on_page
 
 
 @pytest.mark.parametrize(
@@ -21,3 +21,19 @@ def test_balls_and_amplitudes_are_those_that_would_serve(
 ) -> None:
     assert balls_named(matter) == balls
     assert amplitudes_named(matter) == amplitudes
+
+
+def test_a_term_has_its_meaning_where_it_stands_first() -> None:
+    words = on_page("expected 0.06 mmA x/÷ 2.5 by 10 replicas; raise process.accuracy.replicas")
+    assert words[1] == ("x/÷", TERMS["x/÷"])
+    assert words[3] == ("replicas", TERMS["replicas"])
+    assert words[5] == ("replicas of the accuracy of the process", "process.accuracy.replicas")
+    assert on_page("v0_m_s of C0, then C0 again")[1:] == [
+        ("C0", TERMS["C0"]), ", then C0 again",
+    ]  # fmt: skip
+
+
+def test_terms_in_html_are_explained_outside_tags_and_drawings() -> None:
+    text = '<p class="C0">C0, and C0</p><svg><text>v0</text></svg>'
+    tip = f'<abbr title="{TERMS["C0"]}">C0</abbr>'
+    assert explained(text) == f'<p class="C0">{tip}, and C0</p><svg><text>v0</text></svg>'

@@ -48,7 +48,8 @@ def test_every_candidate_is_there_as_the_log_has_it(out: Path) -> None:
     kinds = [one["kind"] for one in answer["candidates"]]
     assert answer["sentence"] == (
         f"{BUDGET} proposed, {kinds.count('refused')} refused by geometry before any simulation, "
-        f"{kinds.count('simulated')} simulated, 2 confirmed with new seeds."
+        f"{kinds.count('simulated')} simulated, 2 confirmed with new seeds. "
+        "The objective is uniform coverage: mean minus standard deviation of coverage."
     )
     assert kinds.count("refused") > 0
     assert [one["is_start"] for one in answer["candidates"]].index(True) == 0
