@@ -18,29 +18,30 @@ if TYPE_CHECKING:
 def picture(
     path: Path, exact: Run, meshed: dict[int, Run], facets: int, edges: dict[str, np.ndarray]
 ) -> None:
-    """Draws the three profiles and how the figures of the mesh converge.
+    """Draws the three profiles and how the figures of the mesh converge, two in a row.
 
     Below each profile stands the ratio of meshed to analytical.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(14.5, 5.2), dpi=130, layout="constrained")
+    figure = Figure(figsize=(10.0, 10.0), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
-    grid = figure.add_gridspec(2, 4, height_ratios=[2.2, 1.0])
-    for column, name in enumerate(PROFILES):
-        axes = figure.add_subplot(grid[0, column])
+    grid = figure.add_gridspec(4, 2, height_ratios=[2.2, 1.0, 2.2, 1.0])
+    for number, name in enumerate(PROFILES):
+        row, column = 2 * (number // 2), number % 2
+        axes = figure.add_subplot(grid[row, column])
         _profile(
             axes,
-            figure.add_subplot(grid[1, column], sharex=axes),
+            figure.add_subplot(grid[row + 1, column], sharex=axes),
             exact,
             meshed[facets],
             name,
             edges[name],
         )
-        if column == 0:
+        if number == 0:
             axes.legend(frameon=False, labels=["analytical", f"meshed, {facets} facets"])
-    _converges(figure.add_subplot(grid[:, 3]), exact, meshed)
+    _converges(figure.add_subplot(grid[2:, 1]), exact, meshed)
     for axes in figure.axes:
         axes.spines[["top", "right"]].set_visible(False)
         axes.grid(color="#dddddd", lw=0.7)

@@ -1,11 +1,12 @@
 """How cost grows: with triangles, with balls, with replicas, with workers; time and memory.
 
-    python benchmarks/growth.py [--quick] [--kinds KIND ...] [--rounds N]
+    python benchmarks/growth.py [--quick] [--kinds KIND ...] [--rounds N] [--draw]
 
 Each point runs in a process of its own, so that its peak memory is its own; all points of a kind
 take turns, round after round, and figures are medians. `cpu` columns are CPU seconds, `wall_s` is
 by the clock. Rows go to benchmarks/results/growth_KIND.csv with the name of the machine, and the
-picture to docs/images/growth.png; --quick leaves out what takes minutes and writes neither.
+picture to docs/images/growth.png; --quick leaves out what takes minutes and writes neither, and
+--draw draws the rows that are there.
 
 triangles  200 balls in a cylinder. The first set-up of a scene builds the search tree; the next is
            another replica on the same mesh. A set-up is a simulation of a microsecond, with all
@@ -33,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks.gas import HEIGHT, PER_BALL
 from benchmarks.pictures import IMAGES, growth_picture
 from benchmarks.scenes import DIAMETER, PHYSICS, ROOT, cylinder
-from benchmarks.table import print_table, write_csv
+from benchmarks.table import print_table, read_csv, write_csv
 from sim_core import Balls, Scene, TriangleMesh, compile_simulator, pack_balls, simulate
 from sim_core.loop.simulate import Simulation
 
@@ -125,6 +126,17 @@ def cpu_seconds(call: Callable[[], Any]) -> tuple[float, Any]:
     return time.process_time() - before, result
 
 
+# What the columns of the tables are, in the picture.
+WORDS = {
+    "first_cpu_s": "first set-up [CPU s]",
+    "again_cpu_s": "each further set-up [CPU s]",
+    "packing_cpu_s": "placing the balls [CPU s]",
+    "M_collisions_per_cpu_s": "million collisions per CPU s",
+    "cpu_s": "evaluation [CPU s]",
+    "wall_s": "evaluation [s by the clock]",
+    "figures_s": "its figures [s]",
+    "peak_MB": "peak of the memory [MB]",
+}
 KINDS: dict[str, tuple[Callable[[int], dict[str, Any]], tuple[int, ...]]] = {
     "triangles": (triangles, (100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000)),
     "balls": (balls, (30, 100, 300, 1_000, 3_000, 10_000, 30_000, 100_000)),
@@ -158,6 +170,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="small scenes, one round, no files")
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
     parser.add_argument("--rounds", type=int, default=ROUNDS)
+    parser.add_argument("--draw", action="store_true", help="draw the tables of before anew")
     parser.add_argument("--here", nargs=2, metavar=("KIND", "SIZE"), help="one point as JSON")
     options = parser.parse_args()
     if options.here:
@@ -166,6 +179,10 @@ def main() -> None:
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0  # Linux counts kB
         print(json.dumps({**row, "peak_MB": peak}))
         return
+    if options.draw:
+        tables = {kind: read_csv(f"growth_{kind}.csv") for kind in options.kinds}
+        growth_picture(IMAGES / "growth.png", tables, WORDS)
+        return
     tables = {}
     for kind in options.kinds:
         tables[kind] = measured(kind, options.quick, 1 if options.quick else options.rounds)
@@ -173,7 +190,7 @@ def main() -> None:
         if not options.quick:
             write_csv(f"growth_{kind}.csv", tables[kind])
     if not options.quick:
-        growth_picture(IMAGES / "growth.png", tables)
+        growth_picture(IMAGES / "growth.png", tables, WORDS)
 
 
 if __name__ == "__main__":

@@ -21,12 +21,12 @@ WIDE, TALL = 150.0, 62.0  # mm on the page, of each drawing
 SHAFT = {"direction": (0, 0, 1), "angle_deg": (80, 100), "radius_mm": (6, 9)}
 END_FACES = {"direction": (0, 0, 1), "angle_deg": (0, 10), "box_mm": ((-23, -23, 9), (23, 23, 11))}
 CASES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
-    '[holder] kind = "rod", on the end of the shaft': (
+    "A rod on the end of the shaft holds the gear": (
         "gear",
         {"height_mm": 105.0},
         {"holder": {"kind": "rod"}},
     ),
-    '[holder] kind = "collar", grip_mm = 5; [mask] of an end face, 1.5 mm thick': (
+    "A collar grips 5 mm of the shaft; a mask 1.5 mm thick covers an end face": (
         "gear",
         {},
         {
@@ -34,7 +34,7 @@ CASES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
             "mask": {"at": END_FACES, "thickness_mm": 1.5},
         },
     ),
-    '[holder] kind = "plate", grip_mm = 7: a block round the root': (
+    "A plate grips 7 mm of the blade: a block round its root": (
         "blade",
         {"height_mm": 75.0},
         {"holder": {"kind": "plate", "grip_mm": 7.0}},

@@ -69,26 +69,38 @@ def lines_picture(
     figure.savefig(path)
 
 
-def growth_picture(path: Path, tables: dict[str, Sequence[dict[str, Any]]]) -> None:
-    """A panel for each table: all columns against the first, and a line of slope 1."""
+def growth_picture(
+    path: Path, tables: dict[str, Sequence[dict[str, Any]]], words: dict[str, str]
+) -> None:
+    """A panel for each table, two in a row: all columns against the first, and a line of slope 1.
+
+    Args:
+        words: what a column is, by its name.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(4.2 * len(tables), 5.0), dpi=130, layout="constrained")
+    lines = -(-len(tables) // 2)
+    figure = Figure(figsize=(10.0, 4.8 * lines), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
-    for axes, (kind, rows) in zip(figure.subplots(1, len(tables), squeeze=False)[0],
-                                  tables.items(), strict=True):  # fmt: skip
+    panels = figure.subplots(lines, 2, squeeze=False).ravel()
+    for axes in panels[len(tables) :]:
+        axes.set_visible(False)
+    for axes, (kind, rows) in zip(panels, tables.items(), strict=False):
         across, *others = rows[0]
         sizes = np.array([row[across] for row in rows])
         for name, colour, mark in zip(others, COLOURS, MARKS, strict=False):
-            label = name.replace("_", " ").replace("cpu s", "CPU s")
+            label = words[name]
             values = [row[name] for row in rows]
             axes.loglog(sizes, values, marker=mark, color=colour, lw=1.6, label=label)
         low = min(rows[0][name] for name in others)
-        axes.loglog(sizes, low * sizes / sizes[0], color="#bbbbbb", lw=1, ls="--", label="linear")
-        axes.set_title(f"against {kind}", loc="left")
-        axes.set_xlabel(across)
+        line = {"color": "#bbbbbb", "lw": 1, "ls": "--", "label": "in proportion"}
+        axes.loglog(sizes, low * sizes / sizes[0], **line)
+        axes.set_title(f"Cost by number of {kind}", loc="left")
+        axes.set_xlabel(f"number of {across}")
         axes.grid(which="major", color="#dddddd", lw=0.7)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(frameon=False, fontsize=9)
+        axes.legend(
+            frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=2
+        )
     figure.savefig(path)

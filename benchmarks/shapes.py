@@ -38,6 +38,16 @@ SHOWN: dict[str, dict[str, Any]] = {
     },
     "shapes/oblong.py": {"length_mm": 66, "width_mm": 44, "height_mm": 57},
 }
+HEADINGS = {
+    "cylinder": "a cylinder, rounded at the top",
+    "cylinder, leaning": "a cylinder whose wall leans in",
+    "box": "a box with round corners",
+    "prism, leaning": "a prism of six sides that lean out",
+    "revolve": "a profile turned about the axis",
+    "conformal, hull": "walls that follow the part's hull",
+    "conformal, silhouette": "walls that follow its outline",
+    "shapes/oblong.py": "a shape of your own",
+}
 LIGHT = np.array([0.5, -0.7, 0.5]) / np.sqrt(0.99)
 
 
@@ -50,7 +60,8 @@ def main() -> None:
     FigureCanvasAgg(figure)
     for number, (title, keys) in enumerate(SHOWN.items(), start=1):
         axes = figure.add_subplot(2, 4, number, projection="3d", computed_zorder=False)
-        _draw(axes, title, *_made(title, keys))
+        _draw(axes, *_made(title, keys))
+        axes.set_title(HEADINGS[title], y=1.03, fontsize=12)
     figure.subplots_adjust(0.0, 0.0, 1.0, 0.94, 0.0, 0.12)
     figure.savefig(IMAGES / "shapes.png")
 
@@ -71,7 +82,7 @@ def _made(title: str, keys: dict[str, Any]) -> tuple[ShapeSurface, np.ndarray]:
     return design.chamber.surface(part.vertices, part.triangles), part.vertices[part.triangles]
 
 
-def _draw(axes: Any, title: str, cavity: ShapeSurface, part: np.ndarray) -> None:
+def _draw(axes: Any, cavity: ShapeSurface, part: np.ndarray) -> None:
     from matplotlib.colors import to_rgb, to_rgba
     from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
@@ -92,7 +103,6 @@ def _draw(axes: Any, title: str, cavity: ShapeSurface, part: np.ndarray) -> None
     axes.set_aspect("equal")
     axes.view_init(elev=20, azim=-58)
     axes.set_axis_off()
-    axes.set_title(title, y=1.03, fontsize=12)
 
 
 def _edges(cavity: ShapeSurface) -> np.ndarray:

@@ -30,6 +30,13 @@ def write_csv(name: str, rows: Sequence[dict[str, Any]]) -> Path:
     return path
 
 
+def read_csv(name: str) -> list[dict[str, float]]:
+    """The rows of results/``name``, all of numbers, without the machine."""
+    with (RESULTS / name).open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    return [{key: float(text) for key, text in row.items() if key != "machine"} for row in rows]
+
+
 def array_bytes(built: Any) -> int:
     """Memory of a structure's arrays, working space left out."""
     if isinstance(built, np.ndarray):

@@ -77,7 +77,8 @@ def draw_difference(
 def render_difference(job: dict[str, Any]) -> None:
     """Draw the picture of draw_difference; this runs in a child process.
 
-    The camera looks from where most of the target is visible.
+    The camera looks from where most of the target is visible. A candidate that differs nowhere by
+    more than the noise is told of in a sentence, unless all are such.
     """
     surface, titles = _difference_surface(job["first"], job["columns"]), job["titles"]
     limit = _scale_limit(surface, len(titles))
@@ -85,19 +86,26 @@ def render_difference(job: dict[str, Any]) -> None:
     target, rest = cells_of(surface, on_target), cells_of(surface, ~on_target)
     eyes = near_directions(target)
     views = near_views(seen_area(target, [rest], eyes), eyes)
-    rows = []
+    rows: list[Row] = []
+    drawn: list[int] = []
+    alike: list[str] = []
+    differs = [bool((np.asarray(surface[f"real_{k + 1}"]) > 0).any()) for k in range(len(titles))]
     for k, title in enumerate(titles, start=1):
+        if any(differs) and not differs[k - 1]:
+            alike.append(f"{title.splitlines()[0]}: nowhere more than the noise")
+            continue
 
         def add(plotter: Any, k: int = k) -> None:
             _add_difference(plotter, target, rest, k, limit)
 
         rows.append(Row(title, near_panels(add, target, surface, views)))
+        drawn.append(k)
     legend = [(PALE, "within the noise"), (NO_TARGET, "not in the target")]
     used = np.unique(np.asarray(target.regular_faces))
-    if not all((np.asarray(target[f"told_{k}"])[used] > 0).all() for k in range(1, len(rows) + 1)):
+    if not all((np.asarray(target[f"told_{k}"])[used] > 0).all() for k in drawn):
         legend.insert(1, (FEW_DENTS, "too few simulated dents to tell"))
     bar = ColourBar("difference of coverage [%-points]", DIFFERENCE_MAP, (-limit, limit), "both")
-    write_page(job["picture"], rows, legend, bar)
+    write_page(job["picture"], rows, legend, bar, alike)
 
 
 def _add_difference(plotter: Any, target: Surface, rest: Surface, k: int, limit: float) -> None:

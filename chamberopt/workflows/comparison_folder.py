@@ -122,9 +122,9 @@ def _draw_differences(
         over = (
             ""
             if high == "0.0"
-            else f"; averaged over {low if low == high else f'{low} to {high}'} mm"
+            else f"; averaged over {low if low == high else f'{low} to {high}'}\N{NO-BREAK SPACE}mm"
         )
         shares = f"more on {one.more:.0%}, less on {one.less:.0%} of the target{over}"
-        shares = shares.replace("%", " %")
+        shares = shares.replace("%", "\N{NO-BREAK SPACE}%")
         titles.append(f"{label} minus {first}\n{shares}")
     return draw_difference(start, columns, titles, folder / "difference.png")

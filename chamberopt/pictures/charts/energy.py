@@ -16,15 +16,20 @@ if TYPE_CHECKING:
     from chamberopt.results.impact_energy import EnergyMap, ImpactEnergy
 
 MW_PER_CM2 = 0.1  # one W/m² in mW/cm²
+COLUMNS = 2
 BRIGHTEST = 99.0  # percentile of the bins at which the colours end
 
 
 def energy_picture(path: Path, found: ImpactEnergy) -> None:
-    """Write a chart of shares by surface beside maps of power over area, as .png."""
-    figure = new_figure(4.2 + 4.6 * len(found.maps), 4.4)
-    panels = np.atleast_1d(figure.subplots(1, 1 + len(found.maps)))
+    """Write a chart of shares by surface and maps of power over area, two in a row, as .png."""
+    count = 1 + len(found.maps)
+    rows, columns = -(-count // COLUMNS), min(count, COLUMNS)
+    figure = new_figure(5.0 * columns, 4.4 * rows)
+    panels = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+    for axes in panels[count:]:
+        axes.set_visible(False)
     _shares(panels[0], found)
-    for axes, one in zip(panels[1:], found.maps, strict=True):
+    for axes, one in zip(panels[1:], found.maps, strict=False):
         _map(axes, one)
     save_picture(figure, path)
 

@@ -115,8 +115,12 @@ def test_differences_are_drawn(case: tuple, tmp_path: Path) -> None:
     columns = [(value, np.abs(value) > 0.05, np.ones(len(used), dtype=bool))]
     write_differences(tmp_path / "difference.vtp", case[0], columns)
     picture = tmp_path / "difference.png"
-    assert draw_difference(case[0], columns, ["two - one"], picture) is None
+    alike = (value, np.zeros(len(used), dtype=bool), columns[0][2])  # told of in a sentence alone
+    titles = ["two - one", "three - one"]
+    assert draw_difference(case[0], [*columns, alike], titles, picture) is None
     assert colourful(picture) > 0.01
+    rows, across, _ = imread(picture).shape
+    assert rows < 1.5 * across  # of one row of views
 
 
 if __name__ == "__main__":
