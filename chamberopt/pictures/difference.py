@@ -19,6 +19,7 @@ from chamberopt.results.vtp_files import Surface, save_surface
 
 # Brown (less) over white to violet (more), readable for colour-blind readers, and not grey.
 PALE, NO_TARGET = "#e6e9ec", "#a9b0b7"
+WORTH_DRAWING = 0.005  # share of the target that differs by more than the noise
 
 
 Columns = Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -77,8 +78,8 @@ def draw_difference(
 def render_difference(job: dict[str, Any]) -> None:
     """Draw the picture of draw_difference; this runs in a child process.
 
-    The camera looks from where most of the target is visible. A candidate that differs nowhere by
-    more than the noise is told of in a sentence, unless all are such.
+    The camera looks from where most of the target is visible. A candidate that hardly differs
+    anywhere by more than the noise is told of in a sentence, unless all are such.
     """
     surface, titles = _difference_surface(job["first"], job["columns"]), job["titles"]
     limit = _scale_limit(surface, len(titles))
@@ -89,10 +90,12 @@ def render_difference(job: dict[str, Any]) -> None:
     rows: list[Row] = []
     drawn: list[int] = []
     alike: list[str] = []
-    differs = [bool((np.asarray(surface[f"real_{k + 1}"]) > 0).any()) for k in range(len(titles))]
+    used = np.unique(np.asarray(target.regular_faces))
+    shares = [(np.asarray(target[f"real_{k + 1}"])[used] > 0).mean() for k in range(len(titles))]
+    differs = [share >= WORTH_DRAWING for share in shares]
     for k, title in enumerate(titles, start=1):
         if any(differs) and not differs[k - 1]:
-            alike.append(f"{title.splitlines()[0]}: nowhere more than the noise")
+            alike.append(f"{title.splitlines()[0]}: hardly anywhere more than the noise")
             continue
 
         def add(plotter: Any, k: int = k) -> None:
@@ -101,7 +104,6 @@ def render_difference(job: dict[str, Any]) -> None:
         rows.append(Row(title, near_panels(add, target, surface, views)))
         drawn.append(k)
     legend = [(PALE, "within the noise"), (NO_TARGET, "not in the target")]
-    used = np.unique(np.asarray(target.regular_faces))
     if not all((np.asarray(target[f"told_{k}"])[used] > 0).all() for k in drawn):
         legend.insert(1, (FEW_DENTS, "too few simulated dents to tell"))
     bar = ColourBar("difference of coverage [%-points]", DIFFERENCE_MAP, (-limit, limit), "both")
