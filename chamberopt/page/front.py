@@ -16,8 +16,8 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.files import check_new_file, write_bytes
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.calibration import Calibration
-from chamberopt.design.design import validate
-from chamberopt.design.load import is_study
+from chamberopt.design.design import Design, validate
+from chamberopt.design.load import is_study, load_design
 from chamberopt.design.materials import alloys, balls
 from chamberopt.documents.proposal import SIMULATED
 from chamberopt.geometry.meshes.formats import SUFFIXES, is_mesh_name
@@ -25,10 +25,10 @@ from chamberopt.geometry.meshes.part_mesh import PartMesh, keep_part, read_part_
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import METRES_PER, STATED, UnknownUnitError
 from chamberopt.page.acts import Acts, free_folder, path_inside
-from chamberopt.page.answers import part_answer, surface_answer
+from chamberopt.page.answers import part_answer, shape_answer, surface_answer
 from chamberopt.page.page_words import balls_named, choices, on_page
 from chamberopt.page.started_commands import JSON, OneCommand
-from chamberopt.workflows.propose import PICTURE, Wishes
+from chamberopt.workflows.propose import DESIGN, PICTURE, Wishes
 
 PART_NAME = re.compile(r"\w[\w .,()+-]{0,150}")
 PROPOSING = "chamberopt new "  # begins a command that proposes a design
@@ -75,7 +75,19 @@ class Front:
         picture = self._folder / str(now["result"]) / PICTURE
         with suppress(OSError):  # there is none yet
             now["picture"] = f"{now['result']}/{PICTURE}", picture.stat().st_mtime
-        return now | {"proposal": _on_page(now["answer"] or now["draft"])}
+        return now | {"proposal": _on_page(now["answer"] or now.pop("draft"))}
+
+    def chamber(self, _: object) -> bytes:
+        """Return the shape of the chamber that is proposed, of the draft until there is a design.
+
+        Raises InputError if none is proposed yet.
+        """
+        now: dict[str, Any] = self.command.status()
+        if now.get("draft"):
+            return shape_answer(Design.model_validate(now["draft"]["design"]))
+        if not now.get("answer"):
+            raise InputError("no chamber is proposed yet")
+        return shape_answer(load_design(self._folder / str(now["result"]) / DESIGN))
 
     def stop(self, _: object) -> dict[str, object]:
         self.command.stop()

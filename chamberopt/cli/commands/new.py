@@ -140,7 +140,8 @@ def new(
         made = propose(part, wanted, choose)
 
     if pilot:  # which take minutes, and may change it
-        tell_program("draft", asdict(proposal_in_words(made, find_left_out(made))))
+        first = proposal_in_words(made, find_left_out(made))
+        tell_program("draft", {**asdict(first), "design": made.design.model_dump(mode="json")})
     done = write_proposal(made, part, wishes, choose, out, teller)
     words = proposal_in_words(done.made, done.left_out)
     if not json:

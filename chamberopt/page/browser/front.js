@@ -1,7 +1,7 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
 import { ask, attempt, element, onPage, unpack, warning, wordsOf } from "./state.js";
 import { followed, sinceBegin, stage } from "./steps.js";
-import { lights } from "./surfaces.js";
+import { coloursOf, lights, wayToTarget } from "./surfaces.js";
 
 const find = (id) => document.getElementById(id);
 const option = (one) => element("option", { value: [one].flat()[0], textContent: [one].flat().at(-1) }); // a text, or a pair with its words
@@ -38,25 +38,46 @@ async function open(design) {
 }
 
 const view = new View3D(find("view"));
-let drawnPart = "", pointed = "";
+let drawnPart = "", pointed = "", seen = null;
+const CHAMBER = ["walls", "sonotrode", "edges"];
 
 // Draw the part beside its size, where the names of its surfaces are pointed at.
 async function draw(part) {
   find("place").append(find("view"));
   find("place").hidden = !part;
-  if (part === drawnPart) return;
-  view.remove("part");
+  if (part === drawnPart && !view.get("walls")) return;
+  for (const name of ["part", ...CHAMBER]) view.remove(name);
   drawnPart = part;
   if (!part) return;
-  const seen = unpack(await ask("/view", { part, unit: known.unit }));
+  const told = unpack(await ask("/view", { part, unit: known.unit }));
   if (part !== drawnPart) return;
+  seen = told;
   view.kinds = seen.kinds;
   pointed = seen.pointed;
   view.surface("part", { points: seen.points, triangles: seen.triangles, kind: "rest", open: !seen.closed });
-  const { low, high } = view.extent(), size = Math.hypot(...high.map((x, i) => x - low[i]));
-  const middle = low.map((x, i) => (x + high[i]) / 2), way = [0.49, -0.79, 0.35];
-  view.look({ middle, eye: middle.map((x, i) => x + 2 * size * way[i]), size });
+  lookAt(view.extent());
   document.body.dataset.drawn = part;
+}
+
+function lookAt({ low, high }, way = [0.49, -0.79, 0.35]) {
+  const size = Math.hypot(...high.map((x, i) => x - low[i])), middle = low.map((x, i) => (x + high[i]) / 2);
+  view.look({ middle, eye: middle.map((x, i) => x + 2 * size * way[i]), size });
+}
+
+// Put the part into the chamber that is proposed, as far as it is known, in the place of the picture until there is one.
+async function drawChamber(hasPicture) {
+  (hasPicture ? find("of-choices") : find("place-of-draft")).prepend(find("view"));
+  const answer = unpack(await ask("/chamber", {}));
+  if (!seen || answer.state.length !== seen.triangles.length / 3) return; // of another part
+  view.pose("part", answer.rotation, answer.shift);
+  view.colourTriangles("part", coloursOf(seen, answer.state));
+  view.surface("walls", { points: answer.points, triangles: answer.walls, kind: "wall", opacity: 0.16 });
+  view.surface("sonotrode", { points: answer.points.slice(), triangles: answer.sonotrode, kind: "sonotrode", opacity: 0.6 });
+  view.lines("edges", answer.edges, seen.edges);
+  const [low, high] = answer.shape_mm;
+  const box = { low: low.map((x, i) => Math.min(x, answer.part_mm[0][i])), high: high.map((x, i) => Math.max(x, answer.part_mm[1][i])) };
+  lookAt(box, wayToTarget(view.get("part"), answer));
+  document.body.dataset.chamber = hasPicture ? "picture" : "draft";
 }
 view.renderer.domElement.addEventListener("dblclick", () => { if (view.home) view.look(view.home); });
 const shows = (named, name) => lights(named, view, () => ask("/face", { part: known.part, unit: known.unit, name }), () => pointed);
@@ -109,6 +130,7 @@ find("file").addEventListener("change", () => attempt(() => bring(find("file").f
 find("part").addEventListener("change", () => attempt(() => look(find("part").value)));
 
 // Show the command that proposes a chamber: how far it is, and in the end what it proposes.
+let awaited = false; // whether there is no picture yet
 let drawn = 0, told = ""; // when the picture that is shown was drawn; the proposal that is shown
 function tell({ steps, seconds, lines, warnings, fault, exit, picture, result, proposal }) {
   find("made").hidden = false;
@@ -129,6 +151,8 @@ function tell({ steps, seconds, lines, warnings, fault, exit, picture, result, p
   find("rows").hidden = !proposal;
   find("another").hidden = !proposal || !known.part;
   const isDraft = exit === null, now = JSON.stringify([proposal, result, isDraft]);
+  if (proposal && drawnPart && (now !== told || !picture !== awaited)) attempt(() => drawChamber(Boolean(picture)));
+  awaited = !picture;
   find("draft").hidden = !isDraft;
   find("made-end").hidden = isDraft;
   if (!proposal || now === told) return; // its buttons stay while one is pointed at
@@ -150,7 +174,6 @@ function showProposal({ sentence, rows, matters, choices }, design) {
     button.addEventListener("click", () => attempt(() => propose([name])));
     return known.part ? shows(button, name) : button;
   }));
-  if (known.part) find("of-choices").prepend(find("view"));
   find("open-made").onclick = () => attempt(() => open(design));
 }
 

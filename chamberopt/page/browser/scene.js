@@ -1,5 +1,6 @@
 // The view: part and chamber as the newest answers have them, and handles that turn and move the part.
 import { change, endMove, unpack, value } from "./state.js";
+import { coloursOf, wayToTarget } from "./surfaces.js";
 
 const CLEAR = 0.16, FACE = 0.6; // opacity of walls and sonotrode
 const BODIES = ["deflectors", "holder", "mask"]; // that not every chamber has
@@ -18,11 +19,8 @@ export function showPart(buffer) {
 
 // What `shape` answers: at once, without the part taken out.
 export function showShape(answer) {
-  const mesh = view.get("part"), r = answer.rotation, s = answer.shift;
-  mesh.matrixAutoUpdate = false;
-  mesh.matrix.set(r[0], r[1], r[2], s[0], r[3], r[4], r[5], s[1], r[6], r[7], r[8], s[2], 0, 0, 0, 1);
-  mesh.matrixWorldNeedsUpdate = true;
-  mesh.visible = true;
+  view.pose("part", answer.rotation, answer.shift);
+  view.get("part").visible = true;
   for (const name of ["remeshed", ...BODIES]) view.remove(name); // until the cavity is cut anew
   colour("part", answer.state);
   walls(answer);
@@ -51,10 +49,7 @@ function colour(name, state) {
   if (coloured[0] === mesh && coloured[1].every((kind, k) => kind === state[k])) return;
   coloured = [mesh, state];
   mesh.userData.kinds = [...new Set(state)].map((kind) => part.states[kind]);
-  const rgb = part.states.map((kind) => part.kinds[kind][1]).map((hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16) / 255));
-  const colours = new Float32Array(3 * state.length);
-  state.forEach((kind, k) => colours.set(rgb[kind], 3 * k));
-  view.colourTriangles(name, colours);
+  view.colourTriangles(name, coloursOf(part, state));
 }
 
 function walls(answer) {
@@ -88,35 +83,11 @@ function lookAtAll() {
   const [inner, outer] = placed.shape_mm, room = 0.4 * Math.hypot(...outer.map((x, i) => x - inner[i]));
   const low = inner.map((x, i) => Math.min(x, Math.max(x - room, placed.part_mm[0][i])));
   const high = outer.map((x, i) => Math.max(x, Math.min(x + room, placed.part_mm[1][i])));
-  const size = Math.hypot(...high.map((x, i) => x - low[i])), centre = mid(low, high), way = wayToTarget();
+  const size = Math.hypot(...high.map((x, i) => x - low[i])), centre = mid(low, high), way = wayToTarget(view.get("part"), placed);
   view.look({ middle: centre, eye: centre.map((x, i) => x + 2.6 * size * way[i]), size });
 }
 
 view.renderer.domElement.addEventListener("dblclick", () => { if (placed) lookAtAll(); });
-
-// Direction to the eye from which most of the target faces it, of twelve from above and as many from below.
-function wayToTarget() {
-  const corners = view.get("part").geometry.getAttribute("position").array, r = placed.rotation, ways = [];
-  for (const up of [0.33, -0.33]) for (let k = 0; k < 12; k++) {
-    const turn = (k - 1.95) * Math.PI / 6;
-    ways.push([0.94 * Math.cos(turn), 0.94 * Math.sin(turn), up]);
-  }
-  const worth = ways.map(() => 0);
-  for (let k = 0; k < placed.state.length; k++) {
-    if (placed.state[k] !== 1) continue;
-    const [a, b, c] = [0, 3, 6].map((i) => new THREE.Vector3().fromArray(corners, 9 * k + i));
-    const own = b.sub(a).cross(c.sub(a)), normal = [0, 1, 2].map((i) => r[3 * i] * own.x + r[3 * i + 1] * own.y + r[3 * i + 2] * own.z);
-    ways.forEach((way, i) => { worth[i] += Math.max(0, way[0] * normal[0] + way[1] * normal[1] + way[2] * normal[2]); });
-  }
-  const best = (first) => { // the usual way where much the same is seen from all sides
-    const most = Math.max(...worth.slice(first, first + 12));
-    return worth[first] > 0.9 * most ? first : worth.indexOf(most, first);
-  };
-  const above = best(0), below = best(12);
-  const [x, y, z] = ways[worth[below] > 2 * worth[above] ? below : above]; // the floor hides least from above
-  const aside = [1.1 * x + 0.5 * ways[0][0], 1.1 * y + 0.5 * ways[0][1]], long = 0.94 / Math.hypot(...aside);
-  return [long * aside[0], long * aside[1], z]; // a little aside shows its depth
-}
 
 // Sizes of the chamber and of the part's box, its height over the sonotrode, and the axes of the part's file.
 function dimensions() {

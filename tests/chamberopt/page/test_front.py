@@ -154,10 +154,12 @@ def test_a_draft_is_told_before_the_pilots(front: Served, tmp_path: Path) -> Non
     rows = {row["name"]: row["value"] for row in now["proposal"]["rows"]}
     assert "height" in rows["chamber"][0]
     assert not any("draft" in line for line in now["lines"])
+    assert b'"shape_mm"' in front.ask("/chamber", {})
     front.ask("/stop", {})
     while (now := json.loads(front.get("/status").read()))["exit"] is None:
         time.sleep(0.1)
     assert now["proposal"] is None
+    assert front.ask("/chamber", {})["error"] == "no chamber is proposed yet"
     assert not (tmp_path / "box").exists()
 
 

@@ -38,6 +38,7 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             opened.wait('data-ended="0"')
             expect(page.locator("#sentence")).to_contain_text("Peen face 1 (")
             assert page.locator("#picture img").evaluate("one => one.naturalWidth") > 0
+            opened.wait("data-chamber=picture")  # it is seen in 3D too
             shown = page.locator("#rows tr", has_text="Balls")
             expect(shown).to_contain_text("1.2 mm")
             expect(page.locator("#choices button[aria-pressed=true]")).to_contain_text("face 1")

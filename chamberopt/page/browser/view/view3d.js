@@ -138,6 +138,15 @@ class View3D {
     return mesh;
   }
 
+  // Put a surface elsewhere, by a rotation of nine numbers, row by row, and a shift.
+  pose(name, r, s) {
+    const mesh = this.get(name);
+    mesh.matrixAutoUpdate = false;
+    mesh.matrix.set(r[0], r[1], r[2], s[0], r[3], r[4], r[5], s[1], r[6], r[7], r[8], s[2], 0, 0, 0, 1);
+    mesh.matrixWorldNeedsUpdate = true;
+    this.draw();
+  }
+
   // Mark triangles of a surface, also where they are hidden; null for none.
   highlight(name, triangles, colour) {
     this.remove("highlight");
