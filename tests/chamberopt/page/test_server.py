@@ -17,6 +17,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.facts import describe
 from chamberopt.design.load import load_design
 from chamberopt.documents.facts import facts_in_words
+from chamberopt.page.page_words import TERMS
 from tests.chamberopt.page.conftest import Served
 from tests.hunt.base import write_base
 
@@ -178,8 +179,10 @@ def test_it_says_what_check_says_and_older_questions_are_dropped(served: Served)
 
 
 def as_said(words: list[str | list[str]]) -> str:
-    """A message with its keys, of which the page has words."""
-    return "".join(one if isinstance(one, str) else one[1] for one in words)
+    """A message with its keys, of which the page has words, and without meanings of terms."""
+    return "".join(
+        one if isinstance(one, str) else one[0 if one[0] in TERMS else 1] for one in words
+    )
 
 
 def told(answer: dict) -> list[tuple[str, str]]:
