@@ -228,7 +228,7 @@ def _change(sides: set[str]) -> str:
 
 
 HEIGHT_TOLERANCE = 1e-9  # m: corners are level if their heights differ by less
-FEW = 0.05  # share of the balls that may find room on a holder or mask without a warning
+FEW = 0.05  # share of the balls that may find room on part, holder or mask without a warning
 AREA_TOLERANCE = 1e-6  # share of a triangle's area: a smaller upward component is rounding
 REMEDY = {
     "part": "turn it (effects.part_turn), tilt it (part.rotate_deg), or lower chamber.{key} to "
@@ -273,7 +273,7 @@ def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
         faces = upward & own
         if not faces.any():
             continue
-        few = FEW * shot.count * shot.diameter**2 if name in chamber.fixtures else 0.0
+        few = 0.0 if name == "wall" else FEW * shot.count * shot.diameter**2
         level = bool(area[faces & flat].sum() >= max(cross_section, few))
         # balls do not roll off these faces
         shown = faces & flat if level else faces & _in_hollows(chamber, upward, downward)

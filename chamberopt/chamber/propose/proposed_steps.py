@@ -173,7 +173,8 @@ def with_finer_balls(
         if weak is not None and found.intensity.value < STRONGER * weak.value:
             return None, f"{plain(weak.value, 2)} mmA of {finer_mm:g} mm are hardly less"
         budgets = [measured_budget(coarse, found), measured_budget(finer, after)]
-        is_needed = for_fillets or fine.touched > most.touched + AS_GOOD
+        left_bare = 1.0 - _touched_area(coarse) / _touched_area(finer)
+        is_needed = for_fillets or left_bare > AS_GOOD
         if not is_needed and gain < MUCH and budgets[1].treatment >= budgets[0].treatment:
             longer = f"{rounded(budgets[1].treatment, 3)} s more for {gain:.0%} of the target"
             return None, f"{longer} do not pay: {shares}"
@@ -193,6 +194,12 @@ def with_finer_balls(
         f"or take one size (--ball-mm {finer_mm:g} or {coarse_mm:g})"
     )
     return replace(two, reasons={**two.reasons, ".steps": reason}), ""
+
+
+def _touched_area(made: Proposal) -> float:
+    """Return the area of the target that the balls can touch in the chamber [m²]."""
+    part = made.chamber.part
+    return touched_share(made) * float(part.area[part.target].sum())
 
 
 def _raised(made: Proposal, by_mm: float) -> Proposal:
