@@ -222,7 +222,7 @@ class _Pilots:
         way = Way(first, self.wishes.geometry, self._measure(first))
         self.begin(WAYS)
         made, wanted, found = propose_quicker(way, self._again, quietly)
-        why_so = {"part.rotate_deg": made.reasons["part.rotate_deg"]}
+        why_so = {"part.rotate_deg": made.reasons["part.rotate_deg"]}  # with poses that were tried
         intensity, asked = self.wishes.intensity, self.wishes.asked_intensity()
         # A stated alloy has a usual intensity, which a proposal should not miss.
         seeks = bool(wanted.alloy and intensity is None and found and is_off(made, found.intensity))
@@ -241,9 +241,10 @@ class _Pilots:
                 made = with_expected_intensity(made, found.intensity)
             self.begin(FURTHER_STEP)
             return _in_budget(*propose_second_pose(made, found, quietly))
-        if wanted.pose != self.wishes.geometry.pose:  # by pilots, and not as asked
-            made = replace(made, reasons={**made.reasons, **why_so})
+        made = _told(made, why_so)
         larger = larger_balls(made, wanted, asked, found, self._again, quietly)
+        if larger is not None:
+            larger = _told(larger[0], why_so), larger[1]
         coarse = larger or (made, found)
         if seeks:
             made, coarse = as_no_wish(made), (as_no_wish(coarse[0]), coarse[1])
@@ -301,6 +302,11 @@ class _Pilots:
         self.teller.compile(made.design, made.chamber, None)
         with self.teller.step("pilot run of the intensity") as progress:
             return predict_intensity(made.design, made.chamber, self.executor, progress)
+
+
+def _told(made: Proposal, reasons: dict[str, str]) -> Proposal:
+    """Return a proposal with these reasons in the place of its own."""
+    return replace(made, reasons={**made.reasons, **reasons})
 
 
 def _in_budget(made: Proposal, found: Measured | None) -> Proposal:
