@@ -13,7 +13,7 @@ from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.propose.proposed_target import SHAPES, named_surfaces
 from chamberopt.chamber.propose.shop import load_shop
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import check_new_file, write_bytes
+from chamberopt.common.files import check_new_file, read_file, write_bytes
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.calibration import Calibration
 from chamberopt.design.design import Design, validate
@@ -110,10 +110,12 @@ class Front:
         }
 
     def upload(self, name: str, content: bytes) -> dict[str, object]:
-        """Write a part's file into the folder, where no file has this name."""
+        """Write a part's file into the folder, unless it is there, and no other of this name is."""
         if not is_mesh_name(name) or not PART_NAME.fullmatch(name):
             raise InputError(f"{name}: not a part that can be read: {', '.join(SUFFIXES)}")
         path = self._folder / name
+        if path.is_file() and path.stat().st_size == len(content) and read_file(path) == content:
+            return {"part": name}
         if path.exists():
             raise InputError(f"{name} is in {self._folder} already: choose it, or rename yours")
         write_bytes(check_new_file(path), content)

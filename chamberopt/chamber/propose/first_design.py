@@ -248,7 +248,7 @@ def _proposed(
         "sonotrode.blocks": of_blocks(diameter),
         "part.unit": f"UNIT GUESSED: {measures}"
         if is_guessed
-        else f"{measures}, as its numbers are in {mesh.unit}, {by}",
+        else f"{measures}, unit {mesh.unit}, {by}",
         "part.target": target.reason,
         "shot.diameter_mm": ball_reason,
         **({"shot.material": shot_reason} if shot_reason else {}),
