@@ -470,13 +470,15 @@ class Search:
             self._best[trial.stage] = max(trial.score, self._best.get(trial.stage, -math.inf))
 
     def _tell_progress(self, best: float | None) -> None:
-        """Tell what is done and the most that there will be.
+        """Tell what is done and the most that there will be, and the best score so far.
 
         Candidates that cost only a part of an evaluation, or nothing, leave budget for more
         candidates. So trials would be no measure.
         """
         if self._progress is None:
             return
+        if best is not None and self._study.objective.is_cost:
+            best = -best  # as its figure is shown
         if self._sweep is not None:
             self._progress(len(self.trials), len(self._sweep), best)
             return

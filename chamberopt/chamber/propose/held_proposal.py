@@ -114,7 +114,10 @@ def _outside_in_words(made: Proposal) -> str:
     beyond = high - part.vertices.max(axis=0), part.vertices.min(axis=0) - low
     signs = zip(("+", "-"), beyond, strict=True)
     sides = [f"{sign}{'xyz'[k]}" for sign, room in signs for k in range(3) if room[k] < -SEEN_OUT]
-    outside, areas = part.area - chamber.exposed_area, {}
+    # What is buried in another body of the part, or under a mask, is not outside.
+    corners = part.vertices[part.triangles]
+    is_beyond = ((corners < low) | (corners > high)).any(axis=(1, 2))
+    outside, areas = np.where(is_beyond, part.area - chamber.exposed_area, 0.0), {}
     for one in named_or_all(made.known):
         rows = rows_of(made.design, one.keys) & ~part.target
         areas[one.name] = float(outside[rows].sum())

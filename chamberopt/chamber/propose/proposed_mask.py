@@ -150,9 +150,33 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     hidden = 1.0 - touched_share(proposal)
     if hidden > LEAST and not part.target.reachable:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
-    others = [one for one in proposal.known if not np.any(one.triangles & target)]
+    beside = [one for one in proposal.known if not np.any(one.triangles & target)]
+    names = {one.name for one in [*beside, *_bodies_of(proposal, target, beside)]}
+    others = [one for one in proposal.known if one.name in names]
     found += _met_beside(proposal, others[:MOST_LOOKED_AT], float(area[target].sum()))
     return found
+
+
+def _bodies_of(
+    proposal: Proposal, target: np.ndarray, others: Sequence[Surface]
+) -> Iterator[Surface]:
+    """Yield the bodies of which a target is a face, such as a shaft of which a fillet is peened.
+
+    What the file names beside the target stands for a body that is mostly made of it.
+
+    Args:
+        target: marks the triangles of the target in the part's file, (m,).
+        others: surfaces beside the target.
+    """
+    area = areas(proposal.mesh.vertices, proposal.mesh.triangles)
+    named = [one.triangles for one in others if "surface" in one.keys]
+    told = np.any(named, axis=0) if named else np.zeros(len(area), dtype=bool)
+    chosen = proposal.tables["part.target"].get("surface", ())
+    for one in proposal.known:
+        names, rest = {*one.keys.get("surface", ())}, one.triangles & ~target
+        is_body = bool(names) and not names & {*chosen, "all"} and np.any(one.triangles & target)
+        if is_body and area[rest & ~told].sum() > 0.5 * area[rest].sum() > 0.0:
+            yield one
 
 
 def _met_beside(

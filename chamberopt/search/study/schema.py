@@ -114,6 +114,11 @@ class Objective(FileTable):
             return (" + ".join(f"{weight:.10g} {name}" for name, weight in self.sum.items()),)
         return self.pareto or (self.name,)
 
+    @property
+    def is_cost(self) -> bool:
+        """Whether the first objective is minus what is to be small, such as a time."""
+        return all(weight <= 0.0 for weight in parse_objective(self.goals[0]).terms.values())
+
 
 class Phase(FileTable):
     """A phase of a search: an algorithm, and its share of the budget."""

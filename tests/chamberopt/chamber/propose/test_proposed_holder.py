@@ -2,18 +2,20 @@
 
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import trimesh
 from manifold3d import CrossSection, Manifold
 
+from chamberopt.chamber.propose import held_proposal
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.propose.proposed_end import held_end
 from chamberopt.chamber.propose.proposed_holder import HolderChoice, end_holder, holder_choices
 from chamberopt.chamber.propose.proposed_mask import find_left_out
-from chamberopt.chamber.propose.proposed_target import WHOLE, Target
+from chamberopt.chamber.propose.proposed_target import WHOLE, Surface, Target
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
@@ -207,3 +209,41 @@ def test_what_is_seldom_peened_is_named_or_masked(tmp_path: Path, side: str) -> 
     assert made.design.mask is None
     assert said.text.startswith("NOT MASKED: the shot also meets FLANGE")
     assert said.text in tomllib.loads(text)["to_settle"]
+
+
+def test_the_rest_of_a_body_is_met_beside_a_target_that_is_a_face_of_it(tmp_path: Path) -> None:
+    """A fillet of a shaft is peened: the shot meets the shaft's journals too."""
+    box = trimesh.creation.box((20, 20, 30))
+    lines = [f"v {x} {y} {z}" for x, y, z in box.vertices]
+    for (a, b, c), (x, _, _) in zip(box.faces + 1, box.face_normals, strict=True):
+        lines += [f"g {'KEY' if x > 0.5 else 'SHAFT'}", f"f {a} {b} {c}"]
+    part = tmp_path / "box.obj"
+    part.write_text("\n".join(lines) + "\n")
+    made = propose(part, Wanted("mm"), lambda _: ["face 2.1"])
+    (said,) = (one.text for one in find_left_out(made) if not one.keys)
+    assert said.startswith("NOT MASKED: the shot also meets KEY (360 mm² of it), SHAFT (1080 mm²")
+    named = propose(part, Wanted("mm"), lambda _: ["SHAFT"])
+    assert not any("SHAFT" in one.text for one in find_left_out(named) if not one.keys)
+
+
+def test_what_is_buried_in_another_body_is_no_jaw(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two triangles that the shot does not meet, one lies above the ceiling."""
+    vertices = np.array([[0, 0, 2], [1, 0, 2], [0, 1, 2], [0, 0, 0.5], [1, 0, 0.5], [0, 1, 0.5]])
+    part = SimpleNamespace(
+        vertices=vertices,
+        triangles=np.arange(6).reshape(2, 3),
+        area=np.array([0.5, 0.5]),
+        target=np.zeros(2, dtype=bool),
+    )
+    box = np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
+    chamber = SimpleNamespace(vertices=box, part=part, exposed_area=np.zeros(2))
+    known = [
+        Surface(name, {"surface": [name]}, np.arange(2) == k, "")
+        for k, name in enumerate(("SHAFT", "KEY"))
+    ]
+    monkeypatch.setattr(
+        held_proposal, "rows_of", lambda _, keys: np.array(["SHAFT", "KEY"]) == keys["surface"][0]
+    )
+    made = SimpleNamespace(design=None, chamber=chamber, known=known)
+    words = held_proposal._outside_in_words(made)  # type: ignore[arg-type]
+    assert words == "at +z by SHAFT (500000 mm² of it)"

@@ -22,6 +22,7 @@ def test_a_weighted_sum_is_of_objectives_and_metrics(tmp_path: Path) -> None:
         design=GEAR, vary=VARY, objective={"sum": {"uniform_coverage": 1.0, "time_to_98_s": -0.001}}
     )
     assert study.objective.goals == ("1 uniform_coverage + -0.001 time_to_98_s",)
+    assert not study.objective.is_cost
     for wrong, said in (
         ({"sum": {"uniform_covrage": 1.0}}, "did you mean 'uniform_coverage'"),
         ({"sum": {"shot_count": 0.0}}, "all weights are 0"),
@@ -55,6 +56,7 @@ def test_an_objective_of_numbers_of_the_design_needs_limits(change: dict, said: 
     }
     study = Study(design=GEAR, **tables)
     assert study.objective.goals == ("minus_treatment_time_s",)
+    assert study.objective.is_cost
     with pytest.raises(ValueError, match=said):
         Study(design=GEAR, **{**tables, **change})
 
