@@ -1,5 +1,6 @@
 """Ends that a clamp holds outside, and faces of a part that close its chamber."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +88,24 @@ def test_a_wall_at_a_face_stays_there_as_the_floor_grows() -> None:
         middle = room.middle(type(other)("box", plan, 0.0, 0.0, 0.0, False, 0.0))
         assert 1e3 * middle[0] + 0.5 * plan["length_mm"] == pytest.approx(0.2)
         assert middle[1] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("begins", "wall"), [(-60.0, -22.0), (-21.0, -30.0)])
+def test_both_ends_go_out_near_the_target_where_the_part_is_long_enough(
+    begins: float, wall: float
+) -> None:
+    """A bar up to x = 60 mm, peened from -20 to 20 mm, in a box with 10 mm of room beside it."""
+    low, mid, high = (
+        Manifold.cube((end - begin, side, side)).translate([begin, -0.5 * side, -0.5 * side])
+        for begin, end, side in ((begins, -20.0, 6.0), (-20.0, 20.0, 10.0), (20.0, 60.0, 6.0))
+    )
+    mesh, body = part_of(low + mid + high)
+    target = np.abs(body.triangles_center[:, 0]) < 19.9
+    around = mesh.vertices[np.unique(mesh.triangles[target])]
+    sizes = replace(propose_sizes(mesh.vertices, 5e-3, 1e-3, "box", 1.0, around), gap=10e-3)
+    room = local_room(mesh.vertices, mesh.triangles, target, sizes, 2e-3)
+    assert 1e3 * room.walls[:, 0] == pytest.approx([wall, 22.0])
+    assert room.kept[:, 0].tolist() == [wall == -22.0, True]
 
 
 def test_a_straight_end_is_clamped_and_a_dome_is_not() -> None:
