@@ -43,8 +43,9 @@ export async function start(command, of) {
 // Follow a command to its end, and tell what it has left.
 export async function followToEnd(started) {
   const exit = await follow(started);
-  document.dispatchEvent(new CustomEvent("ended", { detail: exit === 0 ? started.result : "" }));
+  showResult(exit === 0 ? started.result : "");
 }
+const showResult = (result) => document.dispatchEvent(new CustomEvent("ended", { detail: result }));
 
 // Folder of the study that runs now, or "".
 export const running = () => study;
@@ -62,10 +63,18 @@ function show({ command, result, steps, seconds, lines, exit }) {
   isRunning = exit === null;
   allow();
   const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
-  find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps));
+  find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...toResult(exit === 0 ? result : ""));
   find("printed").textContent = lines.join("\n");
   find("printed-fold").hidden = !lines.length;
   if (exit) find("printed-fold").open = true;
+}
+
+// A page that was loaded anew meanwhile has not shown what the command has found.
+function toResult(result) {
+  if (!result) return [];
+  const button = element("button", { type: "button", textContent: "Show the result", title: result });
+  button.addEventListener("click", () => showResult(result));
+  return [button];
 }
 
 for (const button of document.querySelectorAll("[data-command]")) button.addEventListener("click", () => attempt(async () => {

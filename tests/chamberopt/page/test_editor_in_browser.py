@@ -245,6 +245,10 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     opened.wait("data-drawn=yes")
     assert page.locator("#shown #part-0 canvas").count() == 1
     page.click("#close-results")
+    opened.tab("run")
+    page.locator("#progress").get_by_text("Show the result").click()
+    opened.wait("data-drawn=yes")
+    page.click("#close-results")
 
 
 @pytest.mark.long
