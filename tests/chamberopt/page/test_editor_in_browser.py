@@ -247,8 +247,7 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     page.click("#close-results")
     opened.tab("run")
     page.locator("#progress").get_by_text("Show the result").click()
-    opened.wait("data-drawn=yes")
-    page.click("#close-results")
+    expect(page.locator("#shown #part-0 canvas")).to_have_count(1, timeout=WAIT)
 
 
 @pytest.mark.long
