@@ -66,13 +66,14 @@ def _cut_off(trials: Sequence[Trial]) -> np.ndarray:
     A smooth model would take the step for the effect of another parameter, such as the mass of the
     shot. None is left out where fewer points than a plane takes would be left.
     """
-    none = np.zeros(len(trials), dtype=bool)
-    known = [one for one in trials if one.goals and one.reachable is not None]
-    if not known:
-        return none
-    least = (max(known, key=lambda one: one.score).reachable or 0.0) - LOST
-    found = np.array([one.reachable is not None and one.reachable < least for one in trials])
-    return found if len(known) - found.sum() > len(trials[0].point) else none
+    reach = np.array([np.nan if one.reachable is None else one.reachable for one in trials])
+    known: np.ndarray = np.isfinite(reach)
+    if not known.any():
+        return known
+    best = np.argmax(np.where(known, [one.score for one in trials], -np.inf))
+    found = np.asarray(reach < reach[best] - LOST)
+    left = (known & ~found).sum()
+    return found if left > len(trials[0].point) else np.zeros_like(found)
 
 
 def fit_model(

@@ -6,6 +6,7 @@ inequality constraints", ICML 2014.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,14 @@ MAX_DEPTH = 3.0
 LEAST_SIMULATED = 0.5
 # With fewer points for each parameter the length scales of a model are not determined.
 POINTS_PER_PARAMETER = 4
+
+
+View = Callable[[np.ndarray], np.ndarray]
+"""Returns points (k, d) with what a figure depends on, and 0 in the place of the rest."""
+
+
+def _whole(points: np.ndarray) -> np.ndarray:
+    return points
 
 
 @dataclass(frozen=True)
@@ -88,16 +97,11 @@ class SearchModel:
         self.domain, count, there = domain, len(seen.scores), seen.simulated
         running = points[count:]
 
-        def model(values: np.ndarray, variances: np.ndarray, of: np.ndarray) -> GaussianProcess:
-            at = points[:count][of]
-            return GaussianProcess(at, values[of], variances[of], length_factor, running, domain)
-
-        def of_shape() -> GaussianProcess:
-            """Model what can be simulated, by the shape alone if geometry refused the rest."""
-            at, still = (self._seen_by_geometry(one) for one in (points[:count], running))
-            return GaussianProcess(
-                at, known.astype(float), np.zeros(count), length_factor, still, domain
-            )
+        def model(
+            values: np.ndarray, variances: np.ndarray, of: np.ndarray, view: View = _whole
+        ) -> GaussianProcess:
+            at, still = view(points[:count][of]), view(running)
+            return GaussianProcess(at, values[of], variances[of], length_factor, still, domain)
 
         known = there if seen.spared is None or not learns_bounds else there | seen.spared
         middle, top = float(np.median(seen.scores[there])), float(seen.scores[there].max())
@@ -108,17 +112,16 @@ class SearchModel:
         self.score = model(scores, seen.variances, known)
         self.points = points
         self.lowest = float(scores[known].min())
-        self._limits = [
-            (model(one.values, one.variances, there), one.low, one.high)
+        self._limits: list[tuple[GaussianProcess, View, float, float]] = [
+            (model(one.values, one.variances, there), _whole, one.low, one.high)
             for one in seen.figures
             if np.ptp(one.values[there]) > 0.0
         ]
-        self._by_geometry = seen.by_geometry
-        self._can_be_simulated = None if known.all() else of_shape()
-
-    def _seen_by_geometry(self, points: np.ndarray) -> np.ndarray:
-        """Return points (k, d) as what refuses candidates sees them."""
-        return self.domain.shape_of(points) if self._by_geometry else points
+        if not known.all():
+            view = domain.shape_of if seen.by_geometry else _whole
+            everywhere = np.ones(count, dtype=bool)
+            simulated = model(known.astype(float), np.zeros(count), everywhere, view)
+            self._limits.append((simulated, view, LEAST_SIMULATED, np.inf))
 
     def expected(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return mean and standard deviation of the score that a shop gets at points (k, d), (k,).
@@ -169,12 +172,8 @@ class SearchModel:
         from scipy.special import ndtr
 
         probability = np.ones(len(at))
-        models = [(model, at, low, high) for model, low, high in self._limits]
-        if self._can_be_simulated is not None:
-            shape = self._seen_by_geometry(at)
-            models.append((self._can_be_simulated, shape, LEAST_SIMULATED, np.inf))
-        for model, place, low, high in models:
-            mean, deviation = model(place)
+        for model, view, low, high in self._limits:
+            mean, deviation = model(view(at))
             inside = min(margin * np.sqrt(model.noise), 0.25 * (high - low))  # of a narrow band
             probability *= np.maximum(
                 ndtr((high - inside - mean) / deviation) - ndtr((low + inside - mean) / deviation),
