@@ -36,10 +36,14 @@ def write_json_lines() -> None:
     _json_lines = True
 
 
-def tell_program(name: str, known: Mapping[str, object]) -> None:
-    """Write what is known so far as a line of JSON, where a program reads those of steps."""
+def tell_program(name: str, known: Callable[[], Mapping[str, object]]) -> None:
+    """Write what is known so far as a line of JSON, where a program reads those of steps.
+
+    Args:
+        known: works it out, only where it is read.
+    """
     if _json_lines and not _is_quiet:
-        print(json.dumps({name: known}), file=sys.stderr, flush=True)
+        print(json.dumps({name: known()}), file=sys.stderr, flush=True)
 
 
 @contextmanager

@@ -176,9 +176,11 @@ def _lying(
     if (bare := bare_end(mesh, target, upright)) is not None:
         with suppress(InputError):
             root = bare._replace(turns=turns)
-            by_root = _proposed(path, wanted, mesh, known, target, turns, reason, root)
-            if is_firm(by_root) and not rests(by_root):
-                return by_root
+            made = _proposed(path, wanted, mesh, known, target, turns, reason, root)
+            if is_firm(made):
+                by_root = made
+                if not rests(by_root):
+                    return by_root
     along = mesh.vertices @ rotation_matrix(upright)[2]
     whole = np.ptp(along[mesh.triangles[target.triangles]]) > REACHES * np.ptp(along)
     for of_any in (False, True):
@@ -188,8 +190,9 @@ def _lying(
         if end is not None or keeps_target or not whole or is_firm(made):
             break
     # Balls that rest on the part speak against a pose, not against what holds it there.
-    as_calm = by_root is not None and rests(made) and faults(by_root) <= faults(made)
-    return by_root if by_root is not None and as_calm and is_firm(by_root) else made
+    if by_root is not None and rests(made) and faults(by_root) <= faults(made):
+        return by_root
+    return made
 
 
 def _proposed(

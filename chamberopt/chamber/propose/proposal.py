@@ -182,8 +182,14 @@ def beginning(warning: str) -> str:
 
 def touched_share(made: Proposal) -> float:
     """Return the share of the target's area that the balls can touch."""
+    part = made.chamber.part
+    return touched_area(made) / float(part.area[part.target].sum())
+
+
+def touched_area(made: Proposal) -> float:
+    """Return the area of the target that the balls can touch [m²]."""
     part, share = made.chamber.part, touched(made.design, made.chamber)
-    return float(share[part.target] @ part.area[part.target] / part.area[part.target].sum())
+    return float(share[part.target] @ part.area[part.target])
 
 
 def propose_tolerances(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:

@@ -245,7 +245,8 @@ def instead_of_steel(
         return None
     balls = [setting_of(one).ball_mm for one in (steel, heavy)]
     served = [fit_sizes(steel.chamber.part, [1e-3 * one])[0].served for one in balls]
-    gain, off = served[1] - served[0], [abs(_off(intensity, one)) for one in (found, told)]
+    values = found.intensity.value, told.intensity.value
+    gain, off = served[1] - served[0], [abs(intensity.off(one)) for one in values]
     if not ((gain > AS_GOOD and off[1] <= off[0]) or (gain > -AS_GOOD and off[1] < off[0])):
         return None
     text, other = (
@@ -254,12 +255,6 @@ def instead_of_steel(
     )
     reason = f"heavier, for the intensity: {text}; of steel {other} (--shot steel takes these)"
     return replace(heavy, reasons={**heavy.reasons, "shot.material": reason})
-
-
-def _off(intensity: WantedIntensity, found: Measured) -> float:
-    """Return the logarithm of the factor by which a measured intensity lies off its range."""
-    assert found.intensity is not None
-    return intensity.off(found.intensity.value)
 
 
 def beside_larger(

@@ -170,7 +170,7 @@ def _bodies_of(
     """
     area = areas(proposal.mesh.vertices, proposal.mesh.triangles)
     named = [one.triangles for one in others if "surface" in one.keys]
-    told = np.any(named, axis=0) if named else np.zeros(len(area), dtype=bool)
+    told = np.any(named or [area < 0.0], axis=0)
     chosen = proposal.tables["part.target"].get("surface", ())
     for one in proposal.known:
         names, rest = {*one.keys.get("surface", ())}, one.triangles & ~target

@@ -22,6 +22,7 @@ from chamberopt.chamber.propose.proposal import (
     faults,
     propose_charge,
     sonotrode_area,
+    touched_area,
     touched_share,
 )
 from chamberopt.chamber.propose.proposed_balls import (
@@ -173,7 +174,7 @@ def with_finer_balls(
         if weak is not None and found.intensity.value < STRONGER * weak.value:
             return None, f"{plain(weak.value, 2)} mmA of {finer_mm:g} mm are hardly less"
         budgets = [measured_budget(coarse, found), measured_budget(finer, after)]
-        left_bare = 1.0 - _touched_area(coarse) / _touched_area(finer)
+        left_bare = 1.0 - touched_area(coarse) / touched_area(finer)
         is_needed = for_fillets or left_bare > AS_GOOD
         if not is_needed and gain < MUCH and budgets[1].treatment >= budgets[0].treatment:
             longer = f"{rounded(budgets[1].treatment, 3)} s more for {gain:.0%} of the target"
@@ -194,12 +195,6 @@ def with_finer_balls(
         f"or take one size (--ball-mm {finer_mm:g} or {coarse_mm:g})"
     )
     return replace(two, reasons={**two.reasons, ".steps": reason}), ""
-
-
-def _touched_area(made: Proposal) -> float:
-    """Return the area of the target that the balls can touch in the chamber [m²]."""
-    part = made.chamber.part
-    return touched_share(made) * float(part.area[part.target].sum())
 
 
 def _raised(made: Proposal, by_mm: float) -> Proposal:

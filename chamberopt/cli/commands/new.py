@@ -140,8 +140,12 @@ def new(
         made = propose(part, wanted, choose)
 
     if pilot:  # which take minutes, and may change it
-        first = proposal_in_words(made, find_left_out(made))
-        tell_program("draft", {**asdict(first), "design": made.design.model_dump(mode="json")})
+
+        def draft() -> dict[str, object]:
+            first = proposal_in_words(made, find_left_out(made))
+            return {**asdict(first), "design": made.design.model_dump(mode="json")}
+
+        tell_program("draft", draft)
     done = write_proposal(made, part, wishes, choose, out, teller)
     words = proposal_in_words(done.made, done.left_out)
     if not json:
