@@ -31,6 +31,7 @@ from chamberopt.chamber.propose.proposed_mask import LeftOut, find_left_out
 from chamberopt.chamber.propose.proposed_setting import setting_of
 from chamberopt.chamber.propose.proposed_steps import (
     propose_second_pose,
+    turned_over,
     with_finer_balls,
     without_finer,
 )
@@ -280,7 +281,8 @@ class _Pilots:
 
     def _again(self, other: Wanted) -> Proposal:
         with no_steps():  # those of the first proposal, again
-            return propose(self.path, other, self.choose)
+            made = propose(self.path, other, self.choose)
+            return turned_over(made) if other.turned_over else made
 
     def _measure(self, made: Proposal, is_told: bool = True) -> Measured | None:
         """Return what the budget of a proposal follows from; None where no pilot can tell it.

@@ -33,11 +33,13 @@ from chamberopt.common.errors import one_line
 from chamberopt.common.number_text import plain
 from chamberopt.design.almen_strip import USUAL_K_LOG_SD
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE
-from chamberopt.geometry.triangles import areas, edge_keys, sides_of
+from chamberopt.geometry.triangles import area_vectors, areas, edge_keys, sides_of, unit_vectors
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from chamberopt.chamber.build import Chamber
-    from chamberopt.chamber.part import Axis
+    from chamberopt.chamber.part import Axis, Part
     from chamberopt.design.load import Design
     from chamberopt.design.sonotrode import VibratingFace
     from sim_core import TriangleMesh
@@ -48,6 +50,7 @@ if TYPE_CHECKING:
 MAX_PACKING_FRACTION = 0.2
 MIN_AMPLITUDES = 10.0  # between part and sonotrode, as for sonotrode_distance_mm of a design
 MAX_HIDDEN_SHARE = 0.05  # of the target's area; a larger share means a misplaced ceiling or wall
+DOWN = 0.9  # cosine to the way down from which on a face that was level looks at the sonotrode
 MIN_MASKED = 1e-4  # share of the target under a mask that is worth a warning
 MIN_FREE_PATH = 10.0  # chamber heights; on longer paths few balls meet another ball before a dent
 
@@ -123,7 +126,9 @@ def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
         own = reached_part_share(reach, room.source, len(part.triangles))
         shares = np.maximum(shares, own * room.exposed_area)
         balls.add(f"{1e3 * reach.diameter:g}")
-        texts = [*_wall_warnings(one, room, reach), *first_warnings(one, room, reach.mesh, False)]
+        others = [other.part for other in chamber.steps if other is not room]
+        first = first_warnings(one, room, reach.mesh, of_surfaces=False, in_other_steps=others)
+        texts = [*_wall_warnings(one, room, reach), *first]
         if max(one.shot.diameters) == finest:
             texts += fillet_warnings(reach, room, finest)
         share = reached_share(reach, room.on_target)
@@ -144,7 +149,11 @@ def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
 
 
 def first_warnings(
-    design: Design, chamber: Chamber, mesh: TriangleMesh, of_surfaces: bool = True
+    design: Design,
+    chamber: Chamber,
+    mesh: TriangleMesh,
+    of_surfaces: bool = True,
+    in_other_steps: Sequence[Part] = (),
 ) -> list[str]:
     """Return the warnings that do not depend on where the shot reaches the surface.
 
@@ -152,6 +161,7 @@ def first_warnings(
         mesh: surface of the chamber.
         of_surfaces: whether a target that is partly outside the chamber is warned of. One of
             several steps need not have all of it inside.
+        in_other_steps: the part as it stands in the design's other steps.
     """
     shot = design.shot
     texts = _sonotrode_warnings(design, mesh, turning_axis(design, chamber.part))
@@ -171,7 +181,10 @@ def first_warnings(
             )
     texts += _mask_warnings(chamber)
     texts += _side_wall_warnings(design, chamber)
-    texts += [ledge.message for ledge in find_ledges(design, chamber) if ledge.level]
+    looks = (unit_vectors(area_vectors(one.vertices, one.triangles)) for one in in_other_steps)
+    turned_down = np.any([normal[:, 2] < -DOWN for normal in looks], axis=0)
+    ledges = find_ledges(design, chamber, turned_down if in_other_steps else None)
+    texts += [ledge.message for ledge in ledges if ledge.level]
     path = free_path(design, chamber)
     if not design.effects.ball_collisions and path < MIN_FREE_PATH:
         texts.append(

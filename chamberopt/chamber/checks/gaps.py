@@ -246,10 +246,16 @@ class Ledge(NamedTuple):
     level: bool  # true if enough of the surface is level for a ball to lie on
 
 
-def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
+def find_ledges(
+    design: Design, chamber: Chamber, turned_down: np.ndarray | None = None
+) -> list[Ledge]:
     """Return the surfaces of part and wall on which balls can come to rest, each with a message.
 
     These surfaces face up, and neither vibrate nor turn.
+
+    Args:
+        turned_down: marks the part's triangles that face down in another step, (m,). Balls on them
+            do no harm: they fall off then, and the shot meets what lay under them.
     """
     from sim_core import Rest
 
@@ -268,7 +274,10 @@ def find_ledges(design: Design, chamber: Chamber) -> list[Ledge]:
     for own in still.values():
         wall &= ~own
     if design.effects.part_turn is None:
-        still = {"part": chamber.tags == TAG_PART, **still}
+        of_part = chamber.tags == TAG_PART
+        if turned_down is not None:
+            of_part[of_part] = ~turned_down[chamber.source[of_part]]
+        still = {"part": of_part, **still}
     for name, own in {**still, "wall": wall}.items():
         faces = upward & own
         if not faces.any():

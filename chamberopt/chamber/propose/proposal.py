@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -43,6 +44,8 @@ LENGTHS = ("height_mm", "sonotrode_distance_mm")
 PEAK_TO_VALLEY_UM = USUAL["amplitude_pv_um"]
 OF_AMPLITUDE = {"amplitude_um": 0.5 * PEAK_TO_VALLEY_UM, "amplitude_pv_um": PEAK_TO_VALLEY_UM}
 OF_LENGTHS = "heights: ISO 2768-m; amplitude: SAE AMS 2580A; what they cost: simulate --tolerances"
+# Warnings of fillets, slots and gaps that are too narrow, and of what no ball touches.
+NOT_SERVED = re.compile(r"^shot of |^[\d.]+% of |no ball gets in there")
 Tables = dict[str, dict[str, Any]]
 """Tables of a design file by dotted name, as TOML values."""
 
@@ -60,6 +63,7 @@ class Wanted:
     shop: Shop | None = None  # what the shop has; usual sizes if it is not known
     calibration: Path | None = None  # file of the machine's calibration
     coverage: float | None = None  # [%], 200 is twice the time to 98 %
+    turned_over: bool = False  # after half of the time, as a second step
 
 
 @dataclass(frozen=True)
@@ -173,6 +177,20 @@ def new_warning(made: Proposal, before: Proposal) -> str:
     known = {text.partition(":")[0] for text in before.warnings}  # places and areas may differ
     new = [text for text in made.warnings if text.partition(":")[0] not in known]
     return next(iter(new or made.warnings), "balls jam in a gap")
+
+
+def new_harm(made: Proposal, before: Proposal) -> str:
+    """Return in words the harm that a proposal does and another one does not; empty if none.
+
+    A warning that holds in both steps, at another place in each, is no new one. That balls do not
+    get to some of the target is no harm: it counts in what they serve and touch.
+    """
+    known = {beginning(text) for text in before.warnings}
+    of_steps = (re.sub(r"^step \w+: ", "", text) for text in made.warnings)
+    harms = (beginning(text) for text in of_steps if not NOT_SERVED.search(text))
+    new = [text for text in harms if text not in known]
+    jams = "balls jam in a gap" if len(made.jams) > len(before.jams) else ""
+    return next(iter(new), jams)
 
 
 def beginning(warning: str) -> str:

@@ -7,7 +7,6 @@ same chamber, and leave a weaker intensity there.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -18,8 +17,8 @@ from chamberopt.chamber.checks.jams import gaps_in_reach, jam_gaps
 from chamberopt.chamber.propose.held_proposal import bore_clearance_mm
 from chamberopt.chamber.propose.proposal import (
     Proposal,
-    beginning,
     faults,
+    new_harm,
     propose_charge,
     sonotrode_area,
     touched_area,
@@ -54,8 +53,6 @@ RAISED = 1.0, 2.0, 3.0  # ball diameters by which a ceiling is raised for a seco
 # of the time. For fillets, where parts fail, and for what coarse balls leave bare, they pay in any
 # case.
 STRONGER, MUCH = 1.5, 0.15
-# Warnings of fillets, slots and gaps that are too narrow, and of what no ball touches.
-NOT_SERVED = re.compile(r"^shot of |^[\d.]+% of |no ball gets in there")
 Steps = list[dict[str, Any]]
 """The [[steps]] of a design file."""
 
@@ -72,7 +69,7 @@ def propose_second_pose(
         found: what a pilot measured of the proposal; None if nothing.
         measure: simulates a proposal briefly; None if that cannot be done.
     """
-    if found is None or turns(made):
+    if found is None or turns(made) or made.design.steps:
         return made, found
     is_hidden = not found.places and touched_share(made) < COVERED
     if not is_hidden and found.time_to_98 < max(SLOW, UNEVEN * found.mean_time):
@@ -83,15 +80,11 @@ def propose_second_pose(
         return replace(made, reasons={**made.reasons, "part.rotate_deg": reason}), found
 
     try:
-        two = _turned_over(made)
-        for balls in RAISED:  # under a ceiling that fits one pose, balls may jam in the other
-            if "jam in" in _new_harm(two, made):
-                two = min(two, _turned_over(made, balls), key=faults)
-    except InputError:
-        return dropped("what holds it in this pose does not hold it turned over")
-    in_air = any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air
-    if in_air or (harm := _new_harm(two, made)):
-        return dropped("nothing would hold it" if in_air else harm)
+        two = turned_over(made)
+    except InputError as error:
+        return dropped(str(error))
+    if harm := new_harm(two, made):
+        return dropped(harm)
     after = measure(two)
     if after is None or not after.places:
         return dropped("no pilot resolved it")
@@ -101,6 +94,25 @@ def propose_second_pose(
     before = f"{touched_share(made):.0%} of the target is in reach" if is_hidden else found.in_words
     reason = f"turned over after half of the time: by pilots {after.in_words}, in one pose {before}"
     return replace(two, reasons={**two.reasons, ".steps": reason}), after
+
+
+def turned_over(made: Proposal) -> Proposal:
+    """Return a proposal with a second step, turned over, under a ceiling that suits both poses.
+
+    Raises InputError if what holds the part does not hold it then.
+    """
+    try:
+        two = _turned_over(made)
+        for balls in RAISED:  # under a ceiling that fits one pose, balls may jam in the other
+            if "jam in" in new_harm(two, made):
+                two = min(two, _turned_over(made, balls), key=faults)
+    except InputError:
+        text = "what holds it in this pose does not hold it turned over"
+        raise InputError(text) from None
+    if any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air:
+        raise InputError("nothing would hold it")
+    reason = "turned over after half of the time, as balls come to rest on what looks up"
+    return replace(two, reasons={**two.reasons, ".steps": reason})
 
 
 def _turned_over(made: Proposal, raised: float = 0.0) -> Proposal:
@@ -162,10 +174,10 @@ def with_finer_balls(
         if not (gain > AS_GOOD or for_fillets) or most.served < MOSTLY:
             return None, shares
         for balls in RAISED:  # a ceiling that suits the coarse balls may hold the finer ones
-            if "gap" in (harm := _new_harm(finer, coarse)):
+            if "gap" in (harm := new_harm(finer, coarse)):
                 coarse = _raised(coarse, balls * finer_mm)
                 finer, found = _with_shot(coarse, finer_mm), None
-        if harm := _new_harm(finer, coarse):
+        if harm := new_harm(finer, coarse):
             return None, harm
         found, after = found or measure(coarse), measure(finer)
         if found is None or found.intensity is None or after is None:
@@ -291,17 +303,3 @@ def _with_values(made: Proposal, values: Mapping[str, Mapping[str, Any]], steps:
         jams=max(jams, key=len),
         warnings=tuple(warnings(design, chamber)),
     )
-
-
-def _new_harm(two: Proposal, made: Proposal) -> str:
-    """Return in words the harm that only a proposal with two poses does; empty if there is none.
-
-    A warning that holds in both steps, at another place in each, is no new one. That balls do not
-    get to some of the target is no harm: it counts in what they serve and touch.
-    """
-    known = {beginning(text) for text in made.warnings}
-    of_steps = (re.sub(r"^step \w+: ", "", text) for text in two.warnings)
-    harms = (beginning(text) for text in of_steps if not NOT_SERVED.search(text))
-    new = [text for text in harms if text not in known]
-    jams = "balls jam in a gap" if len(two.jams) > len(made.jams) else ""
-    return next(iter(new), jams)

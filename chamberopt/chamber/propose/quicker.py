@@ -3,26 +3,22 @@
 A part that stands on one sonotrode is dented slowly at its upper end, as few balls get there. Lying
 or on edge, over several sonotrodes if it is long, it may take a fifth of the time. A whole layer of
 balls dents faster than half a layer in a roomy chamber, and slower where the balls are in each
-other's way. So all of these are tried, and what is proposed was simulated itself.
+other's way. So all of these are tried, and what is proposed was simulated itself. A part on whose
+upper side balls come to rest is turned over after half of the time.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.propose.held_proposal import rests
 from chamberopt.chamber.propose.pose import AT_SIDE
-from chamberopt.chamber.propose.proposal import (
-    Proposal,
-    Wanted,
-    beginning,
-    faults,
-    new_warning,
-    with_charge,
-)
+from chamberopt.chamber.propose.proposal import Proposal, Wanted, new_harm, with_charge
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS
 from chamberopt.chamber.propose.proposed_budget import LONG, Measured
 from chamberopt.common.errors import InputError
@@ -56,9 +52,8 @@ def propose_quicker(
     best, tried = first, []
     if _is_slow(first) and first.wanted.pose is None and not turns(first.made):
         for pose in AT_SIDE:
-            wanted = replace(first.wanted, pose=pose)
             try:
-                made = again(wanted)
+                made, wanted = _in_pose(replace(first.wanted, pose=pose), again)
             except InputError:
                 continue
             if float(_up(made) @ _up(first.made)) > SAME:
@@ -83,6 +78,19 @@ def propose_quicker(
     return best
 
 
+def _in_pose(wanted: Wanted, again: Callable[[Wanted], Proposal]) -> tuple[Proposal, Wanted]:
+    """Return a proposal for wishes, turned over if balls come to rest on the part, and its wishes.
+
+    Raises InputError if the chamber cannot be built.
+    """
+    made = again(wanted)
+    if rests(made):
+        over = replace(wanted, turned_over=True)
+        with suppress(InputError):  # what holds it in one pose alone is told of this one
+            return again(over), over
+    return made, wanted
+
+
 def _is_slow(way: Way) -> bool:
     return way.found is not None and way.found.time_to_98 > SLOW
 
@@ -101,9 +109,7 @@ def _harm(made: Proposal, first: Proposal) -> str:
     """Return in words why another way is no choice; empty if it is one."""
     if made.chamber.pieces_in_air and not first.chamber.pieces_in_air:
         return "nothing would hold it"
-    if faults(made) > faults(first):
-        return beginning(new_warning(made, first))
-    return ""
+    return new_harm(made, first)
 
 
 def _is_quicker(one: Way, other: Way) -> bool:
@@ -127,7 +133,8 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
     """Return the best way with the times of all poses in the reason for its pose."""
 
     def named(one: Way) -> str:
-        return (one.wanted.pose or "evenly exposed").replace("-", " ")
+        over = ", turned over" if one.wanted.turned_over else ""
+        return (one.wanted.pose or "evenly exposed").replace("-", " ") + over
 
     texts = []
     for one, harm in [(first, ""), *tried]:

@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 import trimesh
 
+from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.checks.check import warnings
 from chamberopt.chamber.propose import proposed_steps
 from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.held_proposal import rests
 from chamberopt.chamber.propose.pose import Pose, end_to_wall, pose_by_size
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, with_charge
 from chamberopt.chamber.propose.proposed_budget import Measured
-from chamberopt.chamber.propose.proposed_steps import propose_second_pose
+from chamberopt.chamber.propose.proposed_steps import propose_second_pose, turned_over
 from chamberopt.chamber.propose.quicker import Way, propose_quicker
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.design.load import load_design
@@ -114,6 +117,44 @@ def test_the_quicker_pose_is_taken_and_all_times_are_told(
     told = best.made.reasons["part.rotate_deg"]
     for text in ("evenly exposed 98 % after about 2000 s", "on edge on", "98 % after about 510 s"):
         assert text in told
+
+
+def test_a_lying_part_on_which_balls_would_rest_is_tried_turned_over(
+    poses: dict[Pose | None, Proposal],
+) -> None:
+    lying = poses["lying"]
+    assert rests(lying)
+
+    def again(wanted: Wanted) -> Proposal:
+        made = poses[wanted.pose]
+        return turned_over(made) if wanted.turned_over else made
+
+    of_one_pose = pilots({None: 2024.0, "lying": 100.0, "on-edge": 1900.0})
+
+    def measure(made: Proposal) -> Measured:
+        return measured(400.0) if made.design.steps else of_one_pose(made)
+
+    best = propose_quicker(Way(poses[None], Wanted("mm"), measured(2024.0)), again, measure)
+    assert best.wanted == Wanted("mm", pose="lying", turned_over=True)
+    assert best.found == measured(400.0)
+    assert "lying, turned over on" in best.made.reasons["part.rotate_deg"]
+    assert best.made.reasons[".steps"].startswith("turned over after half of the time")
+    # What was turned over already is not turned over again.
+    kept = propose_second_pose(best.made, uneven(900.0), lambda _: measured(1.0))
+    assert kept == (best.made, uneven(900.0))
+
+
+def test_balls_that_rest_on_what_is_turned_down_later_are_no_warning(
+    poses: dict[Pose | None, Proposal],
+) -> None:
+    over = turned_over(poses["lying"])
+    assert not rests(over)
+    steps = over.tables[""]["steps"]
+    x, y, z = over.design.part.rotate_deg
+    steps = [steps[0], {**steps[1], "part": {"rotate_deg": [x, y, z + 180.0]}}]
+    turned = over.design.changed({"steps": steps, "holder": None})
+    texts = warnings(turned, build_chamber(turned))
+    assert any("come to rest on the part" in text for text in texts)
 
 
 def test_more_sonotrodes_must_save_more_time(poses: dict[Pose | None, Proposal]) -> None:
