@@ -80,14 +80,18 @@ def chosen_triangles(mesh: PartMesh, wanted: Selection, field: str = "part.targe
 def _on_faces(mesh: PartMesh, wanted: Sequence[FaceAt], field: str) -> np.ndarray:
     """Mark the triangles (m,) on any of the wanted faces.
 
-    Raises InputError if the point that selects a face is off the part's surface.
+    Raises InputError if the point that selects a face is off the part's surface, or the file has no
+    faces of its own where these are wanted.
     """
-    by_crease: dict[float, Faces] = {}
+    by_crease: dict[float | None, Faces] = {}
     chosen = np.zeros(len(mesh.triangles), dtype=bool)
     for k, one in enumerate(wanted):
-        faces = by_crease.get(one.crease_deg)
-        if faces is None:
-            faces = by_crease[one.crease_deg] = Faces(mesh.vertices, mesh.triangles, one.crease_deg)
+        if one.crease not in by_crease:
+            try:
+                by_crease[one.crease] = mesh.faces(one.crease)
+            except InputError as error:
+                raise InputError(f"{field}.faces.{k}.cad_face: {error}") from None
+        faces = by_crease[one.crease]
         place = np.array(one.at_mm) * 1e-3
         face, away = faces.at(place)
         if away > NEAR * np.linalg.norm(mesh.size):

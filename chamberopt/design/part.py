@@ -36,7 +36,21 @@ class FaceAt(FileTable):
     crease_deg: float = quantity(
         0.1, 180, "degrees", "the face ends where neighbouring triangles turn by more", 30.0
     )
+    cad_face: bool = Field(
+        default=False,
+        description="the face as the STEP file has it, also where it goes on smoothly; crease_deg "
+        "is left out",
+    )
     alike: bool = Field(default=False, description="also all faces congruent with it, or mirrored")
+
+    def _problems(self) -> Iterator[Problem]:
+        if self.cad_face and self.crease_deg != type(self).model_fields["crease_deg"].default:
+            yield Problem("crease_deg", "given beside cad_face, which has its own border")
+
+    @property
+    def crease(self) -> float | None:
+        """Angle at which the face ends [degrees]; None where the CAD file says where it ends."""
+        return None if self.cad_face else self.crease_deg
 
 
 class Selection(FileTable):

@@ -1,4 +1,4 @@
-"""Divide a surface into faces: connected triangles that meet at less than a given angle."""
+"""Divide a surface into faces: up to where it turns by an angle, or as a CAD file has them."""
 
 from __future__ import annotations
 
@@ -24,15 +24,21 @@ class Faces:
     Args:
         vertices: vertex positions [m], shape (n, 3).
         triangles: vertex indices, shape (m, 3).
-        crease_deg: largest angle between the normals of neighbours in one face [degrees].
+        border: largest angle between the normals of neighbours in one face [degrees], or the number
+            of each triangle's face in a CAD file, (m,).
     """
 
-    def __init__(self, vertices: np.ndarray, triangles: np.ndarray, crease_deg: float) -> None:
+    def __init__(
+        self, vertices: np.ndarray, triangles: np.ndarray, border: float | np.ndarray
+    ) -> None:
         normal = unit_vectors(area_vectors(vertices, triangles))
         one, two = (side_pairs(triangles) // 3).T
-        smooth = np.einsum("ij,ij->i", normal[one], normal[two]) > np.cos(np.radians(crease_deg))
-        # A triangle without area has no normal. It belongs to the faces of its neighbours.
-        smooth |= ~normal[one].any(axis=1) | ~normal[two].any(axis=1)
+        if isinstance(border, np.ndarray):
+            smooth = border[one] == border[two]
+        else:
+            smooth = np.einsum("ij,ij->i", normal[one], normal[two]) > np.cos(np.radians(border))
+            # A triangle without area has no normal. It belongs to the faces of its neighbours.
+            smooth |= ~normal[one].any(axis=1) | ~normal[two].any(axis=1)
         self.of_triangle = connected_pieces(one[smooth], two[smooth], len(triangles))[1]  # (m,)
         self.count = int(self.of_triangle.max()) + 1
         self._corners, self._normal = vertices[triangles], normal

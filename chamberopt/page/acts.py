@@ -210,8 +210,9 @@ class Acts:
 
     def pick(self, asked: Any) -> dict[str, object]:
         design = self._file(asked).with_changes(asked["changes"])
-        triangle, crease = int(asked["triangle"]), float(asked["crease_deg"])
-        if not 0.1 <= crease <= 180.0:
+        triangle, crease_deg = int(asked["triangle"]), asked["crease_deg"]
+        crease = None if crease_deg is None else float(crease_deg)
+        if crease is not None and not 0.1 <= crease <= 180.0:
             raise InputError(f"crease angle: given {crease:g}; allowed: from 0.1 to 180 degrees")
         if asked["act"] == "down":
             return self._picker.face_down(design, triangle, crease)

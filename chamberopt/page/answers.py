@@ -43,17 +43,19 @@ ARRAY_TYPES = {"f": "<f4", "i": "<u4", "u": "<u4", "b": "u1"}
 def part_answer(mesh: PartMesh) -> bytes:
     """Return the part as its file has it [mm], its named surfaces with areas, and the colours.
 
-    The number of a triangle in `surface` is that of the name of its surface in `groups`.
+    The number of a triangle in `surface` is that of the name of its surface in `groups`, and in
+    `cad_face` that of its face in a CAD file. None of -1 is no number there.
     """
     names = [[one.name, one.text] for one in named_surfaces(mesh)]
     box = [round(1e3 * float(side), 4) for side in mesh.size]
     head = {"names": names, "box_mm": box, "unit": mesh.unit, "notes": list(mesh.notes)}
     head |= {"kinds": KINDS, "states": STATES, "edges": EDGES, "pointed": GREEN}
     head |= {"closed": not len(border_edges(mesh.triangles))}  # or a piece of a drawn set-up
-    named = named_surface(mesh)
+    named, cad_face = named_surface(mesh), mesh.numbering.cad_face
     head |= {"groups": list(mesh.groups)}
-    surface = {} if named is None else {"surface": named.astype(np.uint32)}  # -1 is no number then
-    return packed(head, points=1e3 * mesh.vertices, triangles=mesh.triangles, **surface)
+    numbers = {"surface": named, "cad_face": cad_face}
+    known = {key: one.astype(np.uint32) for key, one in numbers.items() if one is not None}
+    return packed(head, points=1e3 * mesh.vertices, triangles=mesh.triangles, **known)
 
 
 def surface_answer(mesh: PartMesh, name: str) -> bytes:

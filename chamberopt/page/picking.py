@@ -30,10 +30,16 @@ class Picker:
     """
 
     def __init__(self) -> None:
-        self._known: dict[tuple[int, float], tuple[PartMesh, Faces]] = {}
+        self._known: dict[tuple[int, float | None], tuple[PartMesh, Faces]] = {}
 
     def with_face(
-        self, design: Design, table: str, triangle: int, crease_deg: float, alike: bool, add: bool
+        self,
+        design: Design,
+        table: str,
+        triangle: int,
+        crease_deg: float | None,
+        alike: bool,
+        add: bool,
     ) -> dict[str, object]:
         """Return changes of a design that add the face of a triangle to a target, or remove it.
 
@@ -43,7 +49,7 @@ class Picker:
             table: dotted name of the target, e.g. part.target.
             triangle: number of the triangle in the part's file.
             crease_deg: angle between neighbouring triangles from which on they belong to two faces
-                [degrees].
+                [degrees]; None for the faces of a CAD file.
             alike: whether all congruent faces are added or removed too.
             add: whether the face is added.
 
@@ -79,8 +85,8 @@ class Picker:
         for lacking in np.unique(faces.of_triangle[left]):
             if not wanted[faces.of_triangle == lacking].all():
                 raise InputError(
-                    f"{table}: its border does not follow faces at {crease_deg:g} degrees; take "
-                    "another crease angle, or clear it first"
+                    f"{table}: its border does not follow {_in_words(crease_deg)}; take others, or "
+                    "clear it first"
                 )
             rows.append(_row(faces, int(lacking), crease_deg))
         if len(rows) > MAX_FACES:
@@ -93,12 +99,14 @@ class Picker:
             others |= {MASK_KIND: "shell", **{f"mask.{key}": None for key in OF_MASK}}
         return {f"{table}.faces": rows, **others}
 
-    def face(self, design: Design, triangle: int, crease_deg: float, alike: bool) -> Row:
+    def face(self, design: Design, triangle: int, crease_deg: float | None, alike: bool) -> Row:
         """Return the face to which a triangle belongs, as an item of a design's list `faces`."""
         faces = self._faces(preview_part(design).mesh, crease_deg)
         return _row(faces, _face_of(faces, triangle), crease_deg, alike)
 
-    def face_down(self, design: Design, triangle: int, crease_deg: float) -> dict[str, object]:
+    def face_down(
+        self, design: Design, triangle: int, crease_deg: float | None
+    ) -> dict[str, object]:
         """Return changes of a design that lay a face of the part level, towards the sonotrode.
 
         The part is squared to the walls, and a chamber of simple form gets the sizes that `new`
@@ -107,7 +115,7 @@ class Picker:
         Args:
             triangle: number of a triangle of the face.
             crease_deg: angle between neighbouring triangles from which on they belong to two faces
-                [degrees].
+                [degrees]; None for the faces of a CAD file.
         """
         preview = preview_part(design)
         mesh, faces = preview.mesh, self._faces(preview.mesh, crease_deg)
@@ -125,18 +133,18 @@ class Picker:
             changes |= {f"part.offset_mm.{k}": 0.0 for k in (0, 1) if design.part.offset[k]}
         return changes
 
-    def _faces(self, mesh: PartMesh, crease_deg: float) -> Faces:
+    def _faces(self, mesh: PartMesh, crease_deg: float | None) -> Faces:
         key = id(mesh), crease_deg
         if key not in self._known:
             if len(self._known) > 8:
                 self._known.clear()
-            faces = Faces(mesh.vertices, mesh.triangles, crease_deg)
+            faces = mesh.faces(crease_deg)
             self._known[key] = mesh, faces  # a mesh that is kept keeps its id
         return self._known[key][1]
 
     def _mask(self, row: Row, mesh: PartMesh) -> np.ndarray:
         """Return True for each triangle that an item of a design's list `faces` chooses, (m,)."""
-        faces = self._faces(mesh, row.get("crease_deg", 30.0))
+        faces = self._faces(mesh, FaceAt.model_validate(row).crease)
         face, _ = faces.at(1e-3 * np.array(row["at_mm"]))
         if row.get("alike"):
             return np.asarray(faces.alike(face)[faces.of_triangle])
@@ -171,8 +179,12 @@ def _face_of(faces: Faces, triangle: int) -> int:
     return int(faces.of_triangle[triangle])
 
 
-def _row(faces: Faces, face: int, crease_deg: float, alike: bool = False) -> Row:
+def _row(faces: Faces, face: int, crease_deg: float | None, alike: bool = False) -> Row:
     x, y, z = (round(1e3 * float(x), DIGITS) + 0.0 for x in faces.place(face))
-    return FaceAt(at_mm=(x, y, z), crease_deg=crease_deg, alike=alike).model_dump(
-        mode="json", exclude_defaults=True
-    )
+    border = {"cad_face": True} if crease_deg is None else {"crease_deg": crease_deg}
+    made = FaceAt.model_validate({"at_mm": (x, y, z), "alike": alike, **border})
+    return made.model_dump(mode="json", exclude_defaults=True)
+
+
+def _in_words(crease_deg: float | None) -> str:
+    return "faces of the CAD file" if crease_deg is None else f"faces at {crease_deg:g} degrees"

@@ -125,6 +125,7 @@ def _file_rules(place: str, points: str, faces: str) -> dict[str, Rule]:
     return _mesh_rules(place, points, faces) | {
         f"{place}.numbering.elements": Rule(WHOLE, faces, *ANY),
         f"{place}.numbering.faces": Rule(WHOLE, faces, *ANY),
+        f"{place}.numbering.cad_face": Rule(WHOLE, faces, -1, MAX_NUMBER),
     }
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from chamberopt.chamber.fixture import ACROSS, is_hole
 from chamberopt.chamber.propose.pose import Turns, square_to_walls, turns_down
 from chamberopt.chamber.propose.proposed_target import CREASE_DEG
-from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import (
     convex_hull,
@@ -71,7 +70,7 @@ def find_bores(mesh: PartMesh, target: np.ndarray) -> list[Bore]:
     Args:
         target: marks the triangles to be peened, (m,).
     """
-    faces = Faces(mesh.vertices, mesh.triangles, CREASE_DEG)
+    faces = mesh.faces(CREASE_DEG)
     vectors = area_vectors(mesh.vertices, mesh.triangles)
     closed = np.linalg.norm(faces.area_vectors, axis=1) < OPEN * faces.area
     found = []

@@ -24,7 +24,6 @@ from chamberopt.chamber.fixture import OF_FACE
 from chamberopt.chamber.propose.proposed_arbor import Bore, arbor_through
 from chamberopt.chamber.propose.proposed_end import UPRIGHT, box_beyond
 from chamberopt.common.number_text import plain
-from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import (
     centroid,
@@ -168,7 +167,7 @@ def _on_flat_faces(
         turn: rotation of the part into its pose, (3, 3).
     """
     posed = mesh.vertices @ turn.T
-    faces = Faces(mesh.vertices, mesh.triangles, FLAT_DEG)
+    faces = mesh.faces(FLAT_DEG)
     sums = faces.area_vectors @ turn.T
     # A face that bends has a sum of area vectors that is shorter than its area.
     flat = np.linalg.norm(sums, axis=1) > math.cos(math.radians(FLAT_DEG)) * faces.area

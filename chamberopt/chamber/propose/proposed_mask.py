@@ -21,7 +21,6 @@ from chamberopt.chamber.propose.proposed_arbor import Bore
 from chamberopt.chamber.propose.proposed_target import RUNNING, Surface, area_in_mm2, named_or_all
 from chamberopt.design.design import Design
 from chamberopt.design.part import Selection
-from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
 
@@ -106,7 +105,7 @@ def pads(mesh: PartMesh, target: np.ndarray, turns: Turns, ball: float) -> list[
         turns: turns of the part in the chamber [degrees].
         ball: diameter of a ball [m].
     """
-    faces = Faces(mesh.vertices, mesh.triangles, FLAT_DEG)
+    faces = mesh.faces(FLAT_DEG)
     up = faces.area_vectors @ rotation_matrix(turns)[2]
     level = faces.free_of(target) & (up > STRAIGHT_UP * faces.area) & (faces.area > ball * ball)
     found = np.flatnonzero(level)

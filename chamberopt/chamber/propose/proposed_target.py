@@ -17,9 +17,14 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
-from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh, select_triangles
-from chamberopt.geometry.triangles import areas, border_edges
+from chamberopt.geometry.triangles import (
+    area_vectors,
+    areas,
+    border_edges,
+    side_pairs,
+    unit_vectors,
+)
 
 # Room for balls to get round the part and gather speed, in ball diameters and as a share of the
 # part's width. A study varies these starting points.
@@ -146,12 +151,17 @@ SELDOM = re.compile(
 )
 # Names of what runs in bearings: where they are no target, its size and finish must stay.
 RUNNING = re.compile(r"(?<![a-z])(?:pin|journal|race|bearing|zapfen)s?(?![a-z])", re.I)
-BY_SIZE = "CHOSEN BY SIZE ALONE: confirm that it is what fails in use (choose another: --target)"
+CONFIRM = "confirm that it is what fails in use (choose another: --target)"
+BY_SIZE, BY_SHAPE = f"CHOSEN BY SIZE ALONE: {CONFIRM}", f"CHOSEN BY SHAPE: {CONFIRM}"
 AS_LARGE = 0.9  # of the largest face's area: the target takes a face as large, e.g. a blade's back
 PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
 FACE = re.compile(r"face (\d+)", re.I)
+# A fillet is a hollow face of a CAD file that goes on smoothly at this share of its border or more,
+# up to this angle. Its radius is less than this share of the part's size.
+SMOOTH_BORDER, SMOOTH_DEG, WIDE_FILLET = 0.5, 10.0, 0.2
+SAME_RADIUS = 0.02  # relative difference of radii below which fillets are of one radius
 MOST_NAMED = 5  # surfaces of a target that are named; of more, the first are
 Keys = dict[str, Any]
 """Keys of [part.target], "surface" or "faces", and their values."""
@@ -183,9 +193,9 @@ class Target:
 def surfaces(mesh: PartMesh) -> list[Surface]:
     """Return all surfaces that the target can be chosen from.
 
-    First are the surfaces that the file names, then faces, each the largest first.
+    First are the surfaces that the file names, then fillets and faces, each the largest first.
     """
-    return named_surfaces(mesh) + _faces(mesh)
+    return [*named_surfaces(mesh), *_fillets(mesh), *_faces(mesh)]
 
 
 def named_surfaces(mesh: PartMesh) -> list[Surface]:
@@ -253,6 +263,8 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
     if special:
         special.sort(key=lambda one: SELDOM.search(one.name) is not None)
         return _joined(special[:1], by_size("the largest surface that the file names", special[1:]))
+    fillets = [one for one in faces if one.keys["faces"][0].get("cad_face")]
+    faces = [one for one in faces if one not in fillets]
     repeated = [one for one in faces if one.keys["faces"][0].get("alike")]
     counts = {one.name: _count(one) for one in repeated}
     features = [one for one in repeated if counts[one.name] >= PATTERN]
@@ -263,6 +275,9 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         others = [one for one in faces if one not in pattern]
         text = "faces that repeat round the part, such as those of teeth"
         return _joined(pattern, text + beside(others))
+    if fillets:
+        text = f"by their shape, as such are usually peened{beside(faces)}; {BY_SHAPE}"
+        return _joined(fillets, text)
     sizes = [area[one.triangles].sum() for one in faces]
     large = [one for one, size in zip(faces, sizes, strict=True) if size >= AS_LARGE * sizes[0]]
     return _joined(large, by_size("the largest between sharp edges", faces[len(large) :]))
@@ -273,7 +288,7 @@ def _faces(mesh: PartMesh) -> list[Surface]:
 
     Faces that are alike are one surface.
     """
-    faces = Faces(mesh.vertices, mesh.triangles, CREASE_DEG)
+    faces = mesh.faces(CREASE_DEG)
     left, found = np.ones(faces.count, dtype=bool), []
     for face in np.argsort(-faces.area, kind="stable"):
         if left[face]:
@@ -304,9 +319,61 @@ def _faces(mesh: PartMesh) -> list[Surface]:
     return listed
 
 
+def _fillets(mesh: PartMesh) -> list[Surface]:
+    """Return the fillets of a part from CAD, those of one radius as one surface, by their area."""
+    if mesh.numbering.cad_face is None or mesh.normals is None:
+        return []
+    faces, hollow = mesh.faces(None), _hollow_curvature(mesh)
+    corner = np.arange(mesh.triangles.size).reshape(-1, 3)
+    after = np.roll(corner, -1, axis=1).reshape(-1)  # of each corner, the next one of its triangle
+    one, two = side_pairs(mesh.triangles).T  # a side begins at its corner, the other one ends there
+    of, beyond = faces.of_triangle[one // 3], faces.of_triangle[two // 3]
+    places, normals = mesh.vertices[mesh.triangles].reshape(-1, 3), mesh.normals.reshape(-1, 3)
+    long = np.linalg.norm(places[one] - places[after[one]], axis=1) * (of != beyond)
+    turn = np.einsum("ij,ij->i", normals[one], normals[after[two]])
+    smooth = long * (turn > math.cos(math.radians(SMOOTH_DEG)))
+    border, goes_on = (
+        np.bincount(of, x, faces.count) + np.bincount(beyond, x, faces.count)
+        for x in (long, smooth)
+    )
+    least = 1.0 / (WIDE_FILLET * float(np.linalg.norm(mesh.size)))
+    bent = np.array([np.median(hollow[faces.of_triangle == k]) for k in range(faces.count)])
+    left = np.flatnonzero((bent > least) & (goes_on >= SMOOTH_BORDER * border) & (border > 0.0))
+    found = []
+    while len(left):
+        widest = bent[left[faces.area[left].argmax()]]
+        own = left[np.abs(bent[left] / widest - 1.0) < SAME_RADIUS]
+        left = np.setdiff1d(left, own)
+        area = float(faces.area[own].sum())
+        keys = [{"at_mm": faces.place_mm(int(k)), "cad_face": True} for k in own]
+        count = f"{len(own)} faces, " if len(own) > 1 else ""
+        name, marked = f"fillets of {1e3 / widest:.3g} mm", np.isin(faces.of_triangle, own)
+        found.append((area, Surface(name, {"faces": keys}, marked, count + area_in_mm2(area))))
+    return [one for _, one in sorted(found, key=lambda pair: -pair[0])]
+
+
+def _hollow_curvature(mesh: PartMesh) -> np.ndarray:
+    """Return the largest hollow curvature of each triangle [1/m], (m,), from its stated normals.
+
+    The curvatures along the three sides make up its second fundamental form: S. Rusinkiewicz,
+    "Estimating Curvatures and Their Derivatives on Triangle Meshes" (2004).
+    """
+    assert mesh.normals is not None
+    corners = mesh.vertices[mesh.triangles]
+    step, bend = (np.roll(x, -1, axis=1) - x for x in (corners, mesh.normals))
+    along = unit_vectors(step[:, 0])
+    across = np.cross(unit_vectors(area_vectors(mesh.vertices, mesh.triangles)), along)
+    square = np.maximum(np.einsum("mki,mki->mk", step, step), 1e-30)
+    u, v = (np.einsum("mki,mi->mk", step, axis) for axis in (along, across))
+    form = np.stack([u * u, 2.0 * u * v, v * v], axis=2) / square[..., None]
+    value = np.einsum("mki,mki->mk", bend, step) / square
+    p, q, r = np.einsum("mij,mj->mi", np.linalg.pinv(form), value).T
+    return np.asarray(np.hypot(0.5 * (p - r), q) - 0.5 * (p + r))
+
+
 def _single(mesh: PartMesh, of: Surface, number: int) -> Surface | None:
     """Return one of several faces that are alike, by its number from 1; None if there is none."""
-    faces = Faces(mesh.vertices, mesh.triangles, CREASE_DEG)
+    faces = mesh.faces(CREASE_DEG)
     own = np.unique(faces.of_triangle[of.triangles])
     if not 1 <= number <= len(own):
         return None
@@ -367,7 +434,7 @@ def find_surface(mesh: PartMesh, known: Sequence[Surface], name: str) -> Surface
         if of and (single := _single(mesh, of[0], int(found[2]))) is not None:
             return single
     if FACE.fullmatch(name):
-        faces = [one.name for one in known if "faces" in one.keys]
+        faces = [one.name for one in known if FACE.fullmatch(one.name)]
         text = f"the part has {faces[0]} to {faces[-1]}"
         raise InputError(f"--target: given {name!r}, but {text}")
     return _named(

@@ -24,6 +24,7 @@ import numpy as np
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.limits import MAX_MESH_BYTES, read_limited, require_few
+from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.meshes.formats import read_raw_mesh
 from chamberopt.geometry.meshes.healing import sew_bodies, turn_outward
 from chamberopt.geometry.meshes.raw_mesh import ElementNumbers, number_by_position
@@ -62,6 +63,17 @@ class PartMesh:
     def size(self) -> np.ndarray:
         """Sides (3,) of the part's bounding box [m]."""
         return np.asarray(np.ptp(self.vertices, axis=0))
+
+    def faces(self, crease_deg: float | None) -> Faces:
+        """Return the part's faces, which end where the surface turns by an angle [degrees].
+
+        For None they are those of the CAD file. Raises InputError if the file has none.
+        """
+        border = self.numbering.cad_face if crease_deg is None else crease_deg
+        if border is None:
+            text = "the part's file has no faces of its own, as STEP has; leave cad_face out"
+            raise InputError(text)
+        return Faces(self.vertices, self.triangles, border)
 
     def divided(self, vertices: np.ndarray, triangles: np.ndarray, origin: np.ndarray) -> PartMesh:
         """Return the part in other triangles, with the numbers and groups of its own.

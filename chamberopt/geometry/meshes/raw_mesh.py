@@ -22,6 +22,8 @@ class ElementNumbers:
     faces: np.ndarray
     own: bool = False  # True if the numbers are the file's own
     instance: str = ""  # Abaqus instance in which the numbers count, if any
+    # (m,), number of the CAD file's face, -1 for none; None if the file has no such faces
+    cad_face: np.ndarray | None = None
 
     def select(self, rows: np.ndarray) -> ElementNumbers:
         """Return the numbers of some triangles.
@@ -35,7 +37,9 @@ class ElementNumbers:
         elements, faces = (
             np.where(rows >= 0, column[rows], 0) for column in (self.elements, self.faces)
         )
-        return replace(self, elements=elements, faces=faces)
+        of = self.cad_face
+        cad_face = None if of is None else np.where(rows >= 0, of[rows], -1)
+        return replace(self, elements=elements, faces=faces, cad_face=cad_face)
 
 
 def number_by_position(count: int) -> ElementNumbers:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.meshes.native_reader import NativeReader, read_in_child
-from chamberopt.geometry.meshes.raw_mesh import RawMesh
+from chamberopt.geometry.meshes.raw_mesh import RawMesh, number_by_position
 from chamberopt.geometry.meshes.step_tessellation import REMEDY, Tessellation, tessellate
 from chamberopt.geometry.meshes.units import METRES_PER
 
@@ -200,6 +201,7 @@ def read_step(path: Path, content: bytes, how: Tessellation | None = None) -> Ra
         groups,
         unit,
         tuple(notes),
+        replace(number_by_position(len(face_of)), cad_face=face_of),
         bodies=body[face_of],
         normals=arrays["normals"],
         is_exact=True,

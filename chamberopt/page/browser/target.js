@@ -17,6 +17,7 @@ export function fillTarget() {
     return element("li", {}, button, ` ${text}`);
   }));
   if (!fillTarget.part.names.length) find("names").append(element("li", { textContent: "none" }));
+  showBorders();
   showChosen();
 }
 
@@ -65,11 +66,35 @@ find("whole").addEventListener("click", () => only({}));
 find("surface").addEventListener("change", showChosen);
 for (const tab of document.querySelectorAll("nav button")) tab.addEventListener("click", showChosen);
 
+// Whether a click takes a face as the CAD file has it, not up to a crease.
+const byCadFaces = () => Boolean(fillTarget.part?.cad_face) && find("cad-face").checked;
+
+function showBorders() {
+  find("of-cad").hidden = !fillTarget.part.cad_face;
+  find("of-crease").hidden = byCadFaces();
+}
+find("cad-face").addEventListener("change", showBorders);
+
+// The face of the CAD file under the pointer lights up while clicks choose faces.
+let lit = null;
+function light(event) {
+  const isOn = byCadFaces() && !event?.buttons && (!find("target").hidden || isFaceDown());
+  const triangle = isOn && event ? triangleAt(event) : null, face = triangle === null ? null : fillTarget.part.cad_face[triangle];
+  if (face === lit) return;
+  lit = face;
+  const own = [];
+  if (face !== null) fillTarget.part.cad_face.forEach((one, k) => { if (one === face) own.push(k); });
+  view.highlight("part", own.length ? own : null, fillTarget.part.pointed);
+}
+view.renderer.domElement.addEventListener("pointermove", light);
+view.renderer.domElement.addEventListener("pointerleave", () => light(null));
+const isFaceDown = () => find("down").getAttribute("aria-pressed") === "true";
+
 let clicks = Promise.resolve(); // one after the other, each on what the one before has made
 async function click(event) {
-  const down = find("down").getAttribute("aria-pressed") === "true";
+  const down = isFaceDown();
   if (!down && find("target").hidden) return;
-  const triangle = triangleAt(event), crease_deg = Number(find("crease").value);
+  const triangle = triangleAt(event), crease_deg = byCadFaces() ? null : Number(find("crease").value);
   if (triangle === null) throw new Error("no face of the part is there");
   const made = state.changes;
   document.body.dataset.picked = triangle;
@@ -92,7 +117,7 @@ async function click(event) {
 }
 
 view.hearClicks((event) => { clicks = clicks.then(() => attempt(() => click(event))); });
-find("down").addEventListener("click", () => find("down").setAttribute("aria-pressed", find("down").getAttribute("aria-pressed") !== "true"));
+find("down").addEventListener("click", () => find("down").setAttribute("aria-pressed", !isFaceDown()));
 find("add-zone").addEventListener("click", () => attempt(async () => {
   if (!find("zone").value.trim()) throw new Error("give the new zone a name first");
   newZone = !newZone;

@@ -3,20 +3,42 @@
 import json
 from collections.abc import Iterator
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
+from chamberopt.chamber.propose.proposed_target import surfaces
 from chamberopt.cli import main
 from chamberopt.design.load import load_design
 from chamberopt.documents.facts import facts_in_words
+from chamberopt.geometry.meshes.part_mesh import read_part
 from chamberopt.pictures.charts.colours import KINDS
 from tests.chamberopt.page.browser_page import FIND, ON_SCREEN, SIDE, Page
 from tests.chamberopt.page.conftest import Served
+from tests.helpers.eight_parts import KEPT_ASIDE
 from tests.helpers.results.browser import WAIT, chromium, expect, needs_chromium
 
 pytestmark = needs_chromium
+# Whether walls and part are to be seen, and the way from what is looked at to the eye.
+SEEN = """async () => {
+  const { view } = await import("/browser/scene.js");
+  const way = view.camera.position.clone().sub(view.orbit.target).normalize().toArray();
+  return [view.get("walls").visible, view.get("part").visible, way];
+}"""
+# The first of these triangles that can be seen, and the place of its middle on the screen.
+SEEN_OF = """async (triangles) => {
+  const { view } = await import("/browser/scene.js"), part = view.get("part");
+  const { points, index } = part.userData;
+  for (const k of triangles) {
+    const at = new THREE.Vector3();
+    for (let i = 0; i < 3; i++) at.add(new THREE.Vector3().fromArray(points, 3 * index[3 * k + i]));
+    at.divideScalar(3).applyMatrix4(part.matrixWorld);
+    const [clientX, clientY] = view.onScreen(at);
+    if (view.at({ clientX, clientY }, ["part"])?.triangle === k) return [k, clientX, clientY];
+  }
+}"""
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +111,57 @@ def test_two_clicks_measure(opened: Page) -> None:
     ]
     assert page.evaluate(two, [[0, 1, 0], [0.6, 0.8, 0]])[1] == "faces at 36.87°"
     assert page.evaluate(two, [[0, 0, 1], [0, 0, 1]]) == ["5 mm (x 3, y 4, z 0)"]
+
+
+def test_the_legend_hides_a_kind_and_the_view_turns_to_an_axis(opened: Page) -> None:
+    page, wall = opened.page, opened.page.locator("#legend").get_by_role("button", name="wall")
+    way = [0.0, 0.0, 0.0]
+    for is_hidden in (True, False):
+        wall.click()
+        expect(wall).to_have_attribute("aria-pressed", str(not is_hidden).lower())
+        opened.put("chamber.height_mm", 37 if is_hidden else 36)  # which draws the walls anew
+        opened.wait("data-checked=reach")
+        page.get_by_label("view", exact=True).select_option(label="from above")
+        walls, part, way = page.evaluate(SEEN)
+        assert (walls, part) == (not is_hidden, True)
+    assert way == pytest.approx([0.0, 0.0, 1.0], abs=1e-3)
+    page.get_by_label("view", exact=True).select_option(label="as at first")
+    assert abs(page.evaluate(SEEN)[2][2]) == pytest.approx(0.33, abs=0.15)
+    for _ in range(2):
+        page.click("#undo")
+
+
+def test_the_face_of_a_cad_file_lights_up_and_is_taken(opened: Page, tmp_path: Path) -> None:
+    """A fillet of a shaft, which goes on into its journal without a crease."""
+    pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    served = Served(tmp_path, "design.toml")
+    part = KEPT_ASIDE["stepped_shaft"].write(tmp_path)
+    new = {"mesh": f'"{part.name}"', "unit": '"in"', "diameter_mm": "80"}
+    dropped, lines = ("direction", "angle_deg", "box_mm"), []
+    for line in (tmp_path / "design.toml").read_text().splitlines():
+        key = line.partition(" =")[0]
+        if key not in dropped:
+            lines.append(f"{key} = {new.pop(key)}" if key in new else line)
+    (tmp_path / "design.toml").write_text("\n".join(lines))
+    try:
+        page = Page(opened.page.context.browser, served)
+        page.wait("data-checked")
+        page.tab("target")
+        expect(page.page.locator("#of-cad")).to_be_visible()
+        expect(page.page.locator("#of-crease")).to_be_hidden()
+        mesh = read_part(part, "in")
+        fillets = next(one for one in surfaces(mesh) if one.name.startswith("fillets"))
+        seen = page.page.evaluate(SEEN_OF, np.flatnonzero(fillets.triangles).tolist())
+        page.page.mouse.move(*seen[1:])
+        own = mesh.faces(None).of_triangle
+        count = str(int((own == own[seen[0]]).sum()))
+        expect(page.page.locator("#view")).to_have_attribute("data-highlight", count)
+        page.page.mouse.click(*seen[1:])
+        expect(page.page.locator("#chosen")).to_contain_text('"cad_face":true')
+        assert not page.errors
+    finally:
+        served.process.kill()
+        served.process.communicate()
 
 
 def test_a_slider_moves_and_is_undone_as_one(opened: Page) -> None:

@@ -7,15 +7,19 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.part import posed_part, preview_part
+from chamberopt.chamber.part import chosen_triangles, posed_part, preview_part
+from chamberopt.chamber.propose.proposed_target import surfaces
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
+from chamberopt.design.part import Selection
 from chamberopt.geometry.triangles import area_vectors, rotation_matrix
 from chamberopt.page.edited_file import EditedFile
 from chamberopt.page.picking import Picker
 from chamberopt.page.structure import KIND, MASK_KIND, mask_kind, restructured
 from tests.chamberopt.design.test_shipped_parts import PARTS
+from tests.helpers.eight_parts import KEPT_ASIDE
 from tests.helpers.mesh_files import write_stl
+from tests.helpers.synthetic import plate_design
 from tests.hunt.base import write_base
 
 TARGET = "part.target"
@@ -160,3 +164,34 @@ def test_faces_of_holder_and_mask_are_clicked_as_those_of_the_target(gear: Edite
     gear.changes = gone
     gear.click(triangle, of="mask.at")  # and another one after that
     assert gear.design.mask is not None
+
+
+def test_a_click_takes_a_face_as_the_cad_file_has_it(tmp_path: Path) -> None:
+    """The journal beside a fillet goes on into it without a crease; only the fillet is taken."""
+    pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    part = KEPT_ASIDE["stepped_shaft"].write(tmp_path)
+    of_part = {"part.mesh": str(part), "part.unit": "in", "part.target": {}}
+    design = plate_design().changed(of_part)
+    mesh = preview_part(design).mesh
+    fillets = next(one for one in surfaces(mesh) if one.name.startswith("fillets"))
+    first = int(np.flatnonzero(fillets.triangles)[0])
+    picker = Picker()
+    for crease, alone in ((None, True), (30.0, False)):
+        row = picker.face(design, first, crease, alike=False)
+        assert ("cad_face" in row) is alone
+        keys = Selection.model_validate({"faces": [row]})
+        own = chosen_triangles(mesh, keys)
+        assert bool((own & ~fillets.triangles).any()) is not alone
+    changes = picker.with_face(design, TARGET, first, None, alike=False, add=True)
+    assert changes[f"{TARGET}.faces"] == [picker.face(design, first, None, alike=False)]
+
+
+def test_a_part_without_faces_of_its_own_is_told_so(gear: Edited) -> None:
+    with pytest.raises(InputError, match="no faces of its own, as STEP has; leave cad_face out"):
+        gear.picker.face(gear.design, 0, None, alike=False)
+    row = {"at_mm": [0.0, 0.0, 0.0], "cad_face": True}
+    design = gear.design.changed({"part.target": {"faces": [row]}})
+    with pytest.raises(InputError, match=r"part\.target\.faces\.0\.cad_face: the part's file has"):
+        preview_part(design)
+    with pytest.raises(InputError, match="crease_deg: given beside cad_face"):
+        gear.design.changed({"part.target": {"faces": [{**row, "crease_deg": 20.0}]}})

@@ -12,8 +12,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from chamberopt.chamber.part import posed_part
+from chamberopt.chamber.part import chosen_triangles, posed_part
+from chamberopt.chamber.propose.proposed_target import surfaces
 from chamberopt.common.errors import InputError
+from chamberopt.design.part import Selection
 from chamberopt.export.frame import frame_of
 from chamberopt.geometry.meshes import step_tessellation
 from chamberopt.geometry.meshes.native_reader import LEAST_SECONDS
@@ -36,6 +38,7 @@ INCH = (
 SI = "(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT({},.METRE.))"
 RIM_RADIUS = 0.150
 BROACHED = np.array([math.sin(math.radians(8.0)), 0.0, math.cos(math.radians(8.0))])
+GEAR_AND_TREE = "helical_gear", "fir_tree"
 COARSE = Tessellation(1e-4, math.radians(25.0))
 
 
@@ -369,3 +372,35 @@ def test_step_without_its_library_says_what_to_install(
 
     with pytest.raises(InputError, match=r"pip install 'chamberopt\[cad\]'"):
         read_part(written(tmp_path / "part.step", "ISO-10303-21;"))
+
+
+def test_the_faces_of_a_step_file_end_where_it_says_although_they_go_on_smoothly(
+    tmp_path: Path,
+) -> None:
+    """Two fillets of 2.5 mm round shafts of 12.7 and 15 mm: their area is by Pappus's theorem."""
+    mesh = read_part(KEPT_ASIDE["stepped_shaft"].write(tmp_path))
+    faces, creased = mesh.faces(None), mesh.faces(30.0)
+    assert faces.count == len(np.unique(mesh.numbering.cad_face)) == 20
+    assert creased.count < faces.count
+    (fillets,) = (one for one in surfaces(mesh) if one.name.startswith("fillets"))
+    assert fillets.name == "fillets of 2.5 mm"
+    radius, shafts = 2.5e-3, (12.7e-3, 15e-3)
+    ways = [2.0 * math.pi * (one + radius - 2.0 / math.pi * radius) for one in shafts]
+    exact = 0.5 * math.pi * radius * sum(ways)
+    found = areas(mesh.vertices, mesh.triangles)[fillets.triangles].sum()
+    assert found == pytest.approx(exact, rel=2e-3)
+    # Their keys choose them in a design, and a finer division keeps the faces.
+    keys = Selection.model_validate(fillets.keys)
+    assert (chosen_triangles(mesh, keys) == fillets.triangles).all()
+    twice = np.repeat(np.arange(len(mesh.triangles)), 2)
+    cad_face = mesh.divided(mesh.vertices, mesh.triangles[twice], twice).numbering.cad_face
+    assert cad_face is not None
+    assert (cad_face[::2] == mesh.numbering.cad_face).all()
+
+
+def test_no_other_hollow_of_a_part_is_a_fillet(tmp_path: Path) -> None:
+    """Not the bore of a gear, nor flanks; round the tree of a disc are two radii."""
+    gear, tree = (read_part(EIGHT_PARTS[name].write(tmp_path)) for name in GEAR_AND_TREE)
+    assert not [one.name for one in surfaces(gear) if one.name.startswith("fillets")]
+    names = [one.name for one in surfaces(tree) if one.name.startswith("fillets")]
+    assert sorted(names) == ["fillets of 1 mm", "fillets of 2.99 mm"]
