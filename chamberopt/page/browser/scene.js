@@ -92,11 +92,11 @@ view.renderer.domElement.addEventListener("dblclick", () => { if (placed) lookAt
 // Sizes of the chamber and of the part's box, its height over the sonotrode, and the axes of the part's file.
 function dimensions() {
   const [low, high] = placed.shape_mm, [a, b] = placed.part_mm, size = Math.hypot(...high.map((x, i) => x - low[i]));
-  const text = 0.03 * size, gap = 0.06 * size;
+  const gap = 0.06 * size;
   const ends = [
-    [low[0], low[1] - gap, 0], [high[0], low[1] - gap, 0],
-    [high[0] + gap, high[1], 0], [high[0] + gap, high[1], high[2]],
-    [b[0], a[1], 0], [b[0], a[1], a[2]],
+    ...dimension([low[0], low[1], 0], [high[0], low[1], 0], [0, -gap, 0], size),
+    ...dimension([high[0], high[1], 0], [high[0], high[1], high[2]], [gap, 0, 0], size),
+    ...dimension([b[0], a[1], 0], [b[0], a[1], a[2]], [0, 0, 0], size),
   ];
   for (const [i, j] of [[0, 1], [1, 3], [3, 2], [2, 0], [4, 5], [5, 7], [7, 6], [6, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
     for (const k of [i, j]) ends.push([k & 1 ? b[0] : a[0], k & 2 ? b[1] : a[1], k & 4 ? b[2] : a[2]]);
@@ -111,9 +111,23 @@ function dimensions() {
     [`${short(high[0] - low[0])} mm`, [0.5 * (low[0] + high[0]), low[1] - gap, -0.4 * gap]],
     [`${short(high[2])} mm`, [high[0] + gap, high[1], 0.8 * high[2]]],
     [`${short(a[2])} mm`, [b[0], a[1], 0.5 * a[2]]],
-    [b.map((x, i) => short(x - a[i])).join(" × ") + " mm", [0.5 * (a[0] + b[0]), a[1], b[2] + text]],
+    [b.map((x, i) => short(x - a[i])).join(" × ") + " mm", [0.5 * (a[0] + b[0]), a[1], b[2] + 0.03 * size]],
     ...axes,
-  ], text);
+  ]);
+}
+
+// Ends of the lines of a dimension between two places: arrows, aside by a way, and a line from each place to its arrow.
+function dimension(from, to, aside, size) {
+  const add = (place, way, by = 1) => place.map((x, i) => x + by * way[i]), far = Math.hypot(...aside);
+  const along = to.map((x, i) => x - from[i]), length = Math.hypot(...along), head = Math.min(0.02 * size, 0.3 * length);
+  const across = far ? aside.map((x) => x / far) : [1, 0, 0], [start, end] = [add(from, aside), add(to, aside)];
+  const lines = [start, end];
+  for (const [tip, sign] of [[start, 1], [end, -1]]) {
+    const back = add(tip, along, sign * head / Math.max(length, 1e-9));
+    for (const side of [-0.3, 0.3]) lines.push(tip, add(back, across, side * head));
+  }
+  if (far) lines.push(from, add(start, aside, 0.2), to, add(end, aside, 0.2));
+  return lines;
 }
 
 // Number of the part's triangle below the pointer, or null.

@@ -41,7 +41,7 @@ class Measure {
       for (const way of [-arm, arm]) { const tip = one.clone(); tip[axis] += way; ends.push(...tip); }
     const lines = view.lines("measured", Float32Array.from(ends), "#d6006c");
     const middle = places.reduce((sum, one) => sum.add(one), new THREE.Vector3()).divideScalar(places.length);
-    const texts = view.texts("measured text", words.map((text) => [text, middle]), 0.03 * view.home.size);
+    const texts = view.texts("measured text", words.map((text) => [text, middle]));
     texts.children.forEach((one, i) => { one.center.set(0.5, 1.1 * i - 0.2); });
     lines.material.depthTest = false;
     for (const one of [lines, ...texts.children]) Object.assign(one, { renderOrder: 90 }).material.transparent = true;

@@ -1,6 +1,9 @@
 // The tools of views in 3D: a section with its slider, measuring, and the legend of the kinds that are there.
 "use strict";
 class Tools {
+  // Names of views, and the way from what is looked at to the eye. A little aside, as z is up.
+  static WAYS = [["from the front, along y", [0, -1, 0]], ["from the back", [0, 1, 0]], ["from the right, along -x", [1, 0, 0]],
+    ["from the left", [-1, 0, 0]], ["from above", [0, -1e-4, 1]], ["from below", [0, -1e-4, -1]]];
   #cut = { normal: [0, -1, 0], low: -1, high: 1 };
   #isFlipped = false;
 
@@ -20,13 +23,19 @@ class Tools {
     this.at = make("input", { type: "number", step: "any", ariaLabel: "place of the section in mm" });
     this.flip = make("button", { textContent: "Flip", title: "show the other side" });
     this.told = make("output", {});
+    this.from = make("select", { title: "where to look from", ariaLabel: "view" },
+      ...[["", "View"], ["first", "as at first"], ...Tools.WAYS.map(([name], k) => [k, name])].map(([value, textContent]) => make("option", { value, textContent })));
     this.controls = make("span", { hidden: true, className: "cut" }, this.by, this.slider, make("label", {}, this.at, " mm"), this.flip);
-    this.element = make("div", { className: "tools" }, this.section, this.measure, this.controls, this.told);
+    this.element = make("div", { className: "tools" }, this.section, this.measure, this.controls, this.from, this.told);
     this.ruler = new Measure(views, (text) => { this.told.textContent = text; });
     for (const button of [this.section, this.measure]) button.setAttribute("aria-pressed", "false");
     this.section.addEventListener("click", () => this.#turn(this.section.ariaPressed !== "true"));
     this.measure.addEventListener("click", () => this.#measure(this.measure.ariaPressed !== "true"));
     this.by.addEventListener("change", () => this.#begin());
+    this.from.addEventListener("change", () => {
+      for (const view of this.views) view.from(Tools.WAYS[this.from.value]?.[1]);
+      this.from.value = ""; // the view may be turned by hand after this
+    });
     this.slider.addEventListener("input", () => { this.at.value = this.slider.value; this.#apply(); });
     this.at.addEventListener("input", () => { this.slider.value = this.at.value; this.#apply(); });
     this.flip.addEventListener("click", () => { this.#isFlipped = !this.#isFlipped; this.#apply(); });
@@ -89,6 +98,21 @@ class Tools {
     for (const view of this.views) view.section.cut(normal.map((x) => way * x), way * distance);
   }
 
+  // A button that hides the surfaces of a kind in all views, and shows them again.
+  static #hider(views, kind, ...inner) {
+    const button = document.createElement("button");
+    button.append(...inner);
+    button.title = "hide it, or show it again";
+    const show = () => { button.ariaPressed = String(!views[0].hides(kind)); };
+    button.addEventListener("click", () => {
+      const isHidden = !views[0].hides(kind);
+      for (const view of views) view.hide(kind, isHidden);
+      show();
+    });
+    show();
+    return button;
+  }
+
   // Write the kinds that views have now into a list, and keep it so.
   static legend(list, views, kinds) {
     const now = views.map(() => []);
@@ -96,10 +120,10 @@ class Tools {
       view.kinds = kinds;
       view.hearKinds((names) => {
         now[i] = names;
-        list.replaceChildren(...Object.entries(kinds).filter(([name]) => now.flat().includes(name)).map(([, [label, colour]]) => {
+        list.replaceChildren(...Object.entries(kinds).filter(([name]) => now.flat().includes(name)).map(([name, [label, colour]]) => {
           const item = document.createElement("li"), patch = document.createElement("i");
           patch.style.background = colour;
-          item.append(patch, label);
+          item.append(...(views.some((one) => one.isSurface(name)) ? [Tools.#hider(views, name, patch, label)] : [patch, label]));
           return item;
         }));
       });

@@ -1,12 +1,14 @@
 // A view of surfaces in 3D, with z up: camera, light, colours, and what the pointer meets. Lengths in mm.
 "use strict";
 THREE.ColorManagement.enabled = false; // a colour on the screen is the one of the colour bar
+const TEXT_HEIGHT = 0.0115; // over its distance: 2.2 % of the view's height
 class View3D {
   #meshes = new Map();
   #waiting = false;
   #heard = [];
   #clicked = [];
   #kinds = { now: "", hear: null };
+  #hidden = new Set(); // kinds of surfaces that are not to be seen
 
   // The element is filled by the view, and has its size.
   constructor(element) {
@@ -51,8 +53,8 @@ class View3D {
     return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour }));
   }
 
-  // A text that faces the eye, with a height in the scene's units.
-  static textOf(text, at, height, colour = "#1c2226") {
+  // A text that faces the eye, with a height in the scene's units, or as a share of its distance where that is fixed.
+  static textOf(text, at, height, colour = "#1c2226", isFixed = false) {
     const canvas = document.createElement("canvas"), pen = canvas.getContext("2d"), font = "600 48px system-ui, sans-serif";
     pen.font = font;
     canvas.width = Math.ceil(pen.measureText(text).width) + 16;
@@ -61,7 +63,7 @@ class View3D {
     pen.fillRect(0, 0, canvas.width, canvas.height);
     pen.fillStyle = colour;
     pen.fillText(text, 8, 34);
-    const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(canvas), depthTest: false }));
+    const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(canvas), depthTest: false, sizeAttenuation: !isFixed }));
     sprite.scale.set(height * canvas.width / canvas.height, height, 1);
     sprite.position.set(...at);
     return sprite;
@@ -83,7 +85,8 @@ class View3D {
     if (see) Object.assign(material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
     if (scale) geometry.setAttribute("uv", new THREE.BufferAttribute(new Float32Array(points.length / 3 * 2).fill(0.5), 2));
     const mesh = new THREE.Mesh(geometry, material);
-    Object.assign(mesh.userData, { kinds: kind ? [kind] : [], open, points, index: triangles });
+    Object.assign(mesh.userData, { kind, kinds: kind ? [kind] : [], open, points, index: triangles });
+    mesh.visible = !this.#hidden.has(kind);
     return this.#keep(name, mesh);
   }
 
@@ -122,11 +125,11 @@ class View3D {
     return this.#keep(name, new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour })));
   }
 
-  // Replace texts: [text, [x, y, z]] each.
-  texts(name, texts, height) {
+  // Replace texts: [text, [x, y, z]] each. They are as large near as far.
+  texts(name, texts) {
     this.remove(name);
     const group = new THREE.Object3D();
-    for (const [text, at] of texts) group.add(View3D.textOf(text, at, height));
+    for (const [text, at] of texts) group.add(View3D.textOf(text, at, TEXT_HEIGHT, undefined, true));
     return this.#keep(name, group);
   }
 
@@ -211,6 +214,17 @@ class View3D {
     this.draw();
   }
 
+  // Whether a surface is all of one kind, so that it can be hidden.
+  isSurface(kind) { return this.all().some(([, mesh]) => mesh.userData.kind === kind); }
+
+  hides(kind) { return this.#hidden.has(kind); }
+
+  // Hide all surfaces of a kind, now and when they are replaced, or show them again.
+  hide(kind, isHidden) {
+    if (isHidden) this.#hidden.add(kind); else this.#hidden.delete(kind);
+    this.show(this.all().filter(([, mesh]) => mesh.userData.kind === kind).map(([name]) => name), !isHidden);
+  }
+
   #caster(event) {
     const box = this.renderer.domElement.getBoundingClientRect(), caster = new THREE.Raycaster();
     caster.setFromCamera(new THREE.Vector2((event.clientX - box.left) / box.width * 2 - 1,
@@ -253,6 +267,14 @@ class View3D {
     this.camera.updateProjectionMatrix();
     this.orbit.update();
     this.draw();
+  }
+
+  // Look along a way [x, y, z], with z up, at what the view looked at first; from the first eye without one.
+  from(way) {
+    const { middle, eye, size } = this.home, far = Math.hypot(...eye.map((x, i) => x - middle[i]));
+    const home = this.home;
+    this.look({ middle, size, eye: way ? middle.map((x, i) => x + far * way[i]) : eye });
+    this.home = home;
   }
 
   // Turn as another view does.
@@ -299,7 +321,8 @@ class View3D {
   }
 
   #tellKinds() {
-    const there = this.all().filter(([, mesh]) => mesh.visible).flatMap(([, mesh]) => mesh.userData.kinds ?? []);
+    const isThere = ({ visible, userData }) => visible || this.#hidden.has(userData.kind);
+    const there = this.all().filter(([, mesh]) => isThere(mesh)).flatMap(([, mesh]) => mesh.userData.kinds ?? []);
     const kinds = [...new Set([...there, ...this.section.kinds()])], now = kinds.sort().join();
     if (!this.#kinds.hear || now === this.#kinds.now) return;
     this.#kinds.now = now;
