@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.propose.proposed_budget import WIDEST, Measured
+from chamberopt.chamber.propose.proposed_budget import COVERED, WIDEST, Measured, TooSlowError
 from chamberopt.chamber.replica_seed import step_seed
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import share
+from chamberopt.common.number_text import rounded
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.metrics import NEVER, exposed_target
 from chamberopt.design.intensity import PredictedIntensity, Z
@@ -50,9 +51,27 @@ FEW = 40.0  # dents in the median of the narrowest windows; 25 are needed (propo
 # Of all replicas: a run that would have more is not begun, unless it is the first. The second is
 # for a shot that still slows down.
 COLLISIONS, UNSETTLED = 2e6, 8e6
+ENOUGH = 30  # dents from which on they bound the time to 98 %
 # Share of the target in windows that tell an intensity roughly, and the error of its logarithm: of
 # connecting_rod, turbine_disc and vane it was 1.22, 1.0 and 1.33 times that of single places.
 ROUGH, ROUGH_LOG_SD = 0.2, 0.3
+
+
+def _least_time(squares: float, hits: int, area_time: float) -> float:
+    """Return a time [s] before which 98 % of a target cannot be dented; 0 if too little is known.
+
+    No target is covered sooner than one on which the same dents lie evenly, by Avrami's law, as far
+    as its area counts. At the start of a simulation the shot is as quick as it will ever be.
+
+    Args:
+        squares: sum of the squared diameters of its dents [m²].
+        hits: number of these dents.
+        area_time: area of the target times the time in which they fell [m² s].
+    """
+    if hits < ENOUGH:
+        return 0.0
+    most = 0.25 * math.pi * squares / area_time * (1.0 + Z / math.sqrt(hits))
+    return COVERED * math.log(50.0) / most
 
 
 class _TimedReplica(NamedTuple):
@@ -95,11 +114,18 @@ def at_slow_end(design: Design) -> tuple[Design, bool]:
 
 
 def measure_budget(
-    design: Design, chamber: Chamber, executor: Executor, progress: Progress | None = None
+    design: Design,
+    chamber: Chamber,
+    executor: Executor,
+    progress: Progress | None = None,
+    longest: float = math.inf,
 ) -> Measured:
     """Simulate a design briefly, and return what its budget follows from.
 
+    Args:
+        longest: time to 98 % [s] above which nothing more is wanted.
     Raises:
+        TooSlowError: the design takes longer than that.
         InputError: the shot does not fit, the target has no figures, or it was not hit.
         sim_core.SimulationError: a replica cannot be simulated.
     """
@@ -131,6 +157,9 @@ def measure_budget(
         times = [one.time[rows] for one, rows in zip(timed, on, strict=True)]
         warmup, settled = settled_after(np.concatenate(times), np.concatenate(sizes), time)
         hits = sum(map(len, times))
+        least = _least_time(sum(map(np.sum, sizes)), hits, area * REPLICAS * time)
+        if least > longest:
+            raise TooSlowError(f"98 % after more than {rounded(least, 1)} s")
         collisions = sum(one.replica.collisions["total"] for one in timed)
         most = COLLISIONS if settled else UNSETTLED
         if (settled and hits >= DENTS / WIDEST) or GROWTH * collisions > most:

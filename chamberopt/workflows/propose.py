@@ -6,6 +6,7 @@ amplitude, and tell its treatment time.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -14,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.proposed_budget import measured_budget, with_budget
+from chamberopt.chamber.propose.proposed_budget import TooSlowError, measured_budget, with_budget
 from chamberopt.chamber.propose.proposed_intensity import (
     as_no_wish,
     beside_larger,
@@ -284,15 +285,21 @@ class _Pilots:
             made = propose(self.path, other, self.choose)
             return turned_over(made) if other.turned_over else made
 
-    def _measure(self, made: Proposal, is_told: bool = True) -> Measured | None:
+    def _measure(
+        self, made: Proposal, longest: float = math.inf, is_told: bool = True
+    ) -> Measured | None:
         """Return what the budget of a proposal follows from; None where no pilot can tell it.
 
-        The reason is told then, unless is_told is false.
+        The reason is told then, unless is_told is false. Raises TooSlowError if the time to 98 % is
+        longer than `longest` [s].
         """
         try:
             self.teller.compile(made.design, made.chamber, None)
             with self.teller.step("pilot run") as progress:
-                return measure_budget(made.design, made.chamber, self.executor, progress)
+                given = made.design, made.chamber, self.executor, progress
+                return measure_budget(*given, longest)
+        except TooSlowError:
+            raise
         except (InputError, SimulationError) as error:
             text = f"warning: no pilot, treatment and simulated time are starts: {error}"
             if is_told:

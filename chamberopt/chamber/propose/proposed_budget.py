@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from chamberopt.chamber.propose.proposal import REPLICAS, Proposal, touched_share
+from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import rounded
 from chamberopt.design.intensity import PredictedIntensity
 
@@ -41,6 +42,10 @@ MORE, LAGGING = 1.3, 2.0
 ROUGH = 0.4  # half-width of a time over the time, from which on that is a matter to settle
 LONG = 1800.0  # s
 UNEVEN = 1.5  # time of single places over that of the target on average, from which on they rule
+
+
+class TooSlowError(InputError):
+    """A design takes longer than a pilot was to look at; the text says how long at least."""
 
 
 class Measured(NamedTuple):

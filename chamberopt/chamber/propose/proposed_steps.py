@@ -7,6 +7,7 @@ same chamber, and leave a weaker intensity there.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -36,6 +37,7 @@ from chamberopt.chamber.propose.proposed_budget import (
     UNEVEN,
     Budget,
     Measured,
+    TooSlowError,
     in_turn,
     measured_budget,
     with_budget,
@@ -43,7 +45,7 @@ from chamberopt.chamber.propose.proposed_budget import (
 from chamberopt.chamber.propose.proposed_floor import of_blocks
 from chamberopt.chamber.propose.proposed_intensity import LARGER
 from chamberopt.chamber.propose.proposed_setting import setting_of
-from chamberopt.chamber.propose.quicker import QUICKER, SLOW, turns
+from chamberopt.chamber.propose.quicker import SLOW, longest_of_choice, turns
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain, rounded
 
@@ -58,7 +60,7 @@ Steps = list[dict[str, Any]]
 
 
 def propose_second_pose(
-    made: Proposal, found: Measured | None, measure: Callable[[Proposal], Measured | None]
+    made: Proposal, found: Measured | None, measure: Callable[[Proposal, float], Measured | None]
 ) -> tuple[Proposal, Measured | None]:
     """Return a proposal with a second step, turned over, and its pilot, where that is worth it.
 
@@ -67,7 +69,8 @@ def propose_second_pose(
 
     Args:
         found: what a pilot measured of the proposal; None if nothing.
-        measure: simulates a proposal briefly; None if that cannot be done.
+        measure: simulates a proposal briefly; None if that cannot be done. Raises TooSlowError if
+            the time to 98 % is longer than a given one [s].
     """
     if found is None or turns(made) or made.design.steps:
         return made, found
@@ -85,10 +88,13 @@ def propose_second_pose(
         return dropped(str(error))
     if harm := new_harm(two, made):
         return dropped(harm)
-    after = measure(two)
+    try:
+        after = measure(two, math.inf if is_hidden else longest_of_choice(found))
+    except TooSlowError as error:
+        return dropped(f"by a pilot {error} then, in one pose {found.in_words}")
     if after is None or not after.places:
         return dropped("no pilot resolved it")
-    enough = after.time_to_98 <= QUICKER * found.time_to_98 or is_hidden
+    enough = after.time_to_98 <= longest_of_choice(found) or is_hidden
     if not enough or (is_hidden and touched_share(two) < COVERED):
         return dropped(f"by a pilot {after.in_words} then, in one pose {found.in_words}")
     before = f"{touched_share(made):.0%} of the target is in reach" if is_hidden else found.in_words

@@ -9,6 +9,7 @@ upper side balls come to rest is turned over after half of the time.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -20,7 +21,7 @@ from chamberopt.chamber.propose.held_proposal import rests
 from chamberopt.chamber.propose.pose import AT_SIDE
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, new_harm, with_charge
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS
-from chamberopt.chamber.propose.proposed_budget import LONG, Measured
+from chamberopt.chamber.propose.proposed_budget import LONG, Measured, TooSlowError
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.triangles import rotation_matrix
 
@@ -41,13 +42,16 @@ class Way(NamedTuple):
 
 
 def propose_quicker(
-    first: Way, again: Callable[[Wanted], Proposal], measure: Callable[[Proposal], Measured | None]
+    first: Way,
+    again: Callable[[Wanted], Proposal],
+    measure: Callable[[Proposal, float], Measured | None],
 ) -> Way:
     """Return the way that is quickest by pilots, of those with no more faults than the first.
 
     Args:
         again: proposes the design for other wishes.
-        measure: simulates a proposal briefly; None if that cannot be done.
+        measure: simulates a proposal briefly; None if that cannot be done. Raises TooSlowError if
+            the time to 98 % is longer than a given one [s].
     """
     best, tried = first, []
     if _is_slow(first) and first.wanted.pose is None and not turns(first.made):
@@ -59,7 +63,11 @@ def propose_quicker(
             if float(_up(made) @ _up(first.made)) > SAME:
                 continue
             harm = _harm(made, first.made)
-            one = Way(made, wanted, None if harm else measure(made))
+            try:
+                found = None if harm else measure(made, longest_of_choice(best.found))
+            except TooSlowError as error:
+                found, harm = None, str(error)
+            one = Way(made, wanted, found)
             tried.append((one, harm))
             if not harm and _is_quicker(one, best):
                 best = one
@@ -67,7 +75,9 @@ def propose_quicker(
     is_known = best.found is not None and best.found.places  # else a heavier one takes longer still
     if is_known and _is_slow(best) and 2 * best.made.design.shot.count <= MOST_BALLS:
         made = with_charge(best.made, LAYER)
-        found = measure(made)
+        found = None
+        with suppress(TooSlowError):
+            found = measure(made, longest_of_choice(best.found))
         if _is_quicker(Way(made, best.wanted, found), best):
             reason = (
                 f"a whole layer of balls on the sonotrode: {made.design.shot.count}; by pilots "
@@ -89,6 +99,11 @@ def _in_pose(wanted: Wanted, again: Callable[[Wanted], Proposal]) -> tuple[Propo
         with suppress(InputError):  # what holds it in one pose alone is told of this one
             return again(over), over
     return made, wanted
+
+
+def longest_of_choice(found: Measured | None) -> float:
+    """Return the time to 98 % [s] from which on no other way is taken instead of a measured one."""
+    return math.inf if found is None else QUICKER * found.time_to_98
 
 
 def _is_slow(way: Way) -> bool:

@@ -1,11 +1,19 @@
 """A short run that tells how long a first run must be."""
 
+import math
+
 import pytest
 
 from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.propose.proposed_budget import TooSlowError
 from chamberopt.common.executor import local_executor
 from chamberopt.design.intensity import PredictedIntensity
-from chamberopt.simulation.budget_pilot import at_slow_end, measure_budget, rough_intensity
+from chamberopt.simulation.budget_pilot import (
+    _least_time,
+    at_slow_end,
+    measure_budget,
+    rough_intensity,
+)
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 from chamberopt.simulation.replicas import ReplicaSet
 from tests.helpers.synthetic import plate_design
@@ -58,3 +66,20 @@ def test_a_rough_intensity_takes_few_dents() -> None:
     assert full is not None
     assert rough.value == pytest.approx(full.value, rel=0.4)
     assert rough.factor > full.factor
+
+
+def test_what_takes_too_long_is_not_looked_at_to_its_end() -> None:
+    """Even dents cover 98 % after ln 50 over the rate of their areas; 95 % of it is a bound."""
+    design = PLATE.changed({"effects.friction": None})
+    chamber = build_chamber(design)
+    with local_executor() as executor:
+        found = measure_budget(design, chamber, executor)
+        assert measure_budget(design, chamber, executor, longest=found.time_to_98) == found
+        with pytest.raises(TooSlowError, match="98 % after more than") as told:
+            measure_budget(design, chamber, executor, longest=0.1 * found.time_to_98)
+    least = float(str(told.value).split()[-2])
+    assert 0.1 * found.time_to_98 < least < found.time_to_98
+    rate, hits = 0.25 * math.pi * 1e-6 * 400, 400  # of dents of 1 mm: area in each m² and second
+    bound = _least_time(1e-6 * hits, hits, 1.0)
+    assert bound == pytest.approx(0.95 * math.log(50.0) / (rate * (1.0 + 1.96 / 20.0)), rel=1e-3)
+    assert _least_time(1e-6 * 20, 20, 1.0) == 0.0

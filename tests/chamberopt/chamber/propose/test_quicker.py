@@ -1,5 +1,6 @@
 """Poses and charges that are tried by pilots where a treatment takes long."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.held_proposal import rests
 from chamberopt.chamber.propose.pose import Pose, end_to_wall, pose_by_size
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, with_charge
-from chamberopt.chamber.propose.proposed_budget import Measured
+from chamberopt.chamber.propose.proposed_budget import Measured, TooSlowError
 from chamberopt.chamber.propose.proposed_steps import propose_second_pose, turned_over
 from chamberopt.chamber.propose.quicker import Way, propose_quicker
 from chamberopt.chamber.propose.text import design_text
@@ -46,12 +47,14 @@ def poses(leaf: Path) -> dict[Pose | None, Proposal]:
     return {one: propose(leaf, Wanted("mm", ball_mm=3.0, pose=one), lambda _: []) for one in asked}
 
 
-def pilots(times: dict[Pose | None, float]) -> Callable[[Proposal], Measured]:
+def pilots(times: dict[Pose | None, float]) -> Callable[[Proposal, float], Measured]:
     """Return a pilot of the bar, whose time [s] follows from its pose."""
     by_height: dict[float, Pose | None] = {LEAF[0]: None, LEAF[2]: "lying", LEAF[1]: "on-edge"}
 
-    def measure(made: Proposal) -> Measured:
+    def measure(made: Proposal, longest: float = math.inf) -> Measured:
         height = round(1e3 * float(np.ptp(made.chamber.part.vertices[:, 2])), 3)
+        if times[by_height[height]] > longest:
+            raise TooSlowError(f"98 % after more than {longest:g} s")
         return measured(times[by_height[height]])
 
     return measure
@@ -101,9 +104,9 @@ def test_a_quick_design_is_not_tried_in_other_ways(poses: dict[Pose | None, Prop
         raise AssertionError
 
     first = Way(poses[None], Wanted("mm"), measured(500.0))
-    assert propose_quicker(first, again, lambda _: measured(1.0)) is first
+    assert propose_quicker(first, again, lambda *_: measured(1.0)) is first
     unknown = first._replace(found=None)
-    assert propose_quicker(unknown, again, lambda _: measured(1.0)) is unknown
+    assert propose_quicker(unknown, again, lambda *_: measured(1.0)) is unknown
 
 
 def test_the_quicker_pose_is_taken_and_all_times_are_told(
@@ -131,8 +134,8 @@ def test_a_lying_part_on_which_balls_would_rest_is_tried_turned_over(
 
     of_one_pose = pilots({None: 2024.0, "lying": 100.0, "on-edge": 1900.0})
 
-    def measure(made: Proposal) -> Measured:
-        return measured(400.0) if made.design.steps else of_one_pose(made)
+    def measure(made: Proposal, longest: float) -> Measured:
+        return measured(400.0) if made.design.steps else of_one_pose(made, longest)
 
     best = propose_quicker(Way(poses[None], Wanted("mm"), measured(2024.0)), again, measure)
     assert best.wanted == Wanted("mm", pose="lying", turned_over=True)
@@ -140,7 +143,7 @@ def test_a_lying_part_on_which_balls_would_rest_is_tried_turned_over(
     assert "lying, turned over on" in best.made.reasons["part.rotate_deg"]
     assert best.made.reasons[".steps"].startswith("turned over after half of the time")
     # What was turned over already is not turned over again.
-    kept = propose_second_pose(best.made, uneven(900.0), lambda _: measured(1.0))
+    kept = propose_second_pose(best.made, uneven(900.0), lambda *_: measured(1.0))
     assert kept == (best.made, uneven(900.0))
 
 
@@ -173,7 +176,7 @@ def test_a_whole_layer_is_taken_where_it_is_quicker(
     poses: dict[Pose | None, Proposal], share: float
 ) -> None:
     first = Way(poses[None], Wanted("mm", pose="standing"), measured(1000.0))
-    best = propose_quicker(first, lambda _: poses[None], lambda _: measured(1000.0 * share))
+    best = propose_quicker(first, lambda _: poses[None], lambda *_: measured(1000.0 * share))
     count = first.made.design.shot.count
     if share == 0.9:
         assert best is first
@@ -205,7 +208,7 @@ def test_a_part_that_lies_is_turned_over_where_that_is_quicker(
     poses: dict[Pose | None, Proposal], tmp_path: Path
 ) -> None:
     lying = poses["lying"]
-    made, found = propose_second_pose(lying, uneven(900.0), lambda _: measured(400.0))
+    made, found = propose_second_pose(lying, uneven(900.0), lambda *_: measured(400.0))
     assert found == measured(400.0)
     first, other = made.design.in_steps.values()
     up, down = (rotation_matrix(one.part.rotate_deg)[2] for one in (first, other))
@@ -235,10 +238,10 @@ def test_a_part_stays_in_one_pose_where_another_is_no_gain_or_not_held(
 ) -> None:
     made = poses[pose]
     found = uneven(first)
-    kept, same = propose_second_pose(made, found, lambda _: measured(second))
+    kept, same = propose_second_pose(made, found, lambda *_: measured(second))
     assert (kept.design, same) == (made.design, found)
     assert ("not turned over" in kept.reasons["part.rotate_deg"]) is (first > 600.0)
-    assert propose_second_pose(made, None, lambda _: measured(second)) == (made, None)
+    assert propose_second_pose(made, None, lambda *_: measured(second)) == (made, None)
 
 
 def test_a_warning_of_both_poses_is_no_reason_against_the_second(
@@ -251,7 +254,7 @@ def test_a_warning_of_both_poses_is_no_reason_against_the_second(
 
     def pose_two(more: list[str]) -> Proposal:
         monkeypatch.setattr(proposed_steps, "warnings", lambda design, chamber: [*texts, *more])
-        return propose_second_pose(lying, uneven(900.0), lambda _: measured(400.0))[0]
+        return propose_second_pose(lying, uneven(900.0), lambda *_: measured(400.0))[0]
 
     assert pose_two([]).design.steps
     kept = pose_two(["step turned_over: balls can come to rest on the part: 20 mm²"])
