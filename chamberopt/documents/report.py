@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
+from chamberopt.chamber.checks.check import matters
+from chamberopt.common.errors import one_line
 from chamberopt.common.files import read_file
 from chamberopt.common.number_text import estimate_text, typeset
 from chamberopt.documents.answer import answer, answer_lines
@@ -100,6 +102,7 @@ def report(result: Result) -> Document:
     sections = (
         question_section(result),
         answer_section(result, start),
+        _to_settle(result),
         Section("The best chamber" if study else "The chamber", [PartView([scene])]),
         front_section(study) if study else None,
         search_section(result, trials) if study else None,
@@ -277,9 +280,16 @@ def _effect_text(name: str, value: object) -> str:
     return "on" if value else "off"
 
 
+def _to_settle(result: Result) -> Section | None:
+    """Return what is to be settled with the design before its chamber is built, if anything is."""
+    texts = [one_line(text) for text in result.design.to_settle]
+    return Section("To be settled before it is built", [Items(texts)]) if texts else None
+
+
 def _notes(result: Result) -> Section:
-    warnings = result.record.warnings
-    notes = [*(f"Warning: {text}" for text in warnings or ()), *notes_of(result)]
+    warnings, settled = result.record.warnings, {*matters(result.design)}
+    told = (text for text in warnings or () if text not in settled)  # those have their own section
+    notes = [*(f"Warning: {text}" for text in told), *notes_of(result)]
     content = [Sentence(note, "warning") for note in notes]
     if warnings is None:
         text = "The design was not checked; “chamberopt check” lists its warnings."

@@ -40,6 +40,22 @@ def fonts(size: Size) -> tuple[int, int]:
     return round(SMALL_FONT * scale), round(LARGE_FONT * scale)
 
 
+def _font_file() -> str:
+    """Return the file of the font of the program's charts, which views take too."""
+    from matplotlib import font_manager
+
+    return str(font_manager.findfont("DejaVu Sans"))
+
+
+def _set_font(prop: Any) -> None:
+    """Give a text the font of the program's charts, by its text property of VTK."""
+    import vtk
+
+    prop.SetFontFamily(vtk.VTK_FONT_FILE)
+    prop.SetFontFile(_font_file())
+    prop.SetBold(False)
+
+
 def wrap(text: str, width: float, font: int) -> str:
     """Return a text wrapped to lines of a width [pixels].
 
@@ -109,6 +125,7 @@ def show_colour_bar(
         label_font_size=16, width=50 / size[0], height=0.46, position_x=1.0 - 100 / size[0],
         position_y=0.4, render=False,
     )  # fmt: skip
+    _set_font(bar.GetLabelTextProperty())
     bar.DrawAboveRangeSwatchOff()
     bar.DrawNanAnnotationOff()
     lines = textwrap.wrap(quantity.title, 14)
@@ -157,6 +174,9 @@ def show_histogram(plotter: Any, speed: np.ndarray) -> None:
     chart.y_axis.tick_locations, chart.y_axis.tick_labels = whole, [str(one) for one in whole]
     for axis in (chart.x_axis, chart.y_axis):
         axis.label_size, axis.tick_label_size, axis.grid = 15, 13, False
+        for prop in (axis.GetTitleProperties(), axis.GetLabelProperties()):
+            _set_font(prop)
+    _set_font(chart.GetTitleProperties())
     chart.background_color, chart.border_color = (1.0, 1.0, 1.0, 0.85), DARK
     plotter.add_chart(chart)
 
@@ -195,6 +215,5 @@ def _add_text(plotter: Any, name: str, text: str, place: tuple[float, float], fo
     Args:
         place: position of the text's lower left corner in the view [pixels].
     """
-    return plotter.add_text(
-        escape_dollars(text), position=place, font_size=font, color=DARK, name=name, render=False
-    )
+    style = {"font_size": font, "font_file": _font_file(), "color": DARK, "render": False}
+    return plotter.add_text(escape_dollars(text), position=place, name=name, **style)

@@ -4,6 +4,7 @@ import base64
 import json
 import re
 import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import pytest
 
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
-from chamberopt.documents.document import Document, Section, Table
+from chamberopt.documents.document import Document, Items, Section, Table
 from chamberopt.documents.report import report
 from chamberopt.documents.wording import with_interval
 from chamberopt.pictures.drawn_part import DrawnPart
@@ -110,6 +111,24 @@ def test_a_simulation_is_answered_in_one_sentence(simulation: Path) -> None:
     assert not titles & {"Which parameters mattered", "How the search went", "Zones", "Tolerances"}
     assert ("gravity", "on") in rows_of(document, "Physical effects", "In this result")
     assert ("part, SHA-256", result.record.part_sha256) in rows_of(document, "Made with", "")
+
+
+def test_what_is_to_be_settled_stands_beside_the_answer(simulation: Path) -> None:
+    result, matter = load_result(simulation), "NOT MASKED: ask the customer"
+    titles = [one.title for one in report(result).sections]
+    open_one = replace(
+        result,
+        design=result.design.changed({"to_settle": [matter]}),
+        record=result.record.model_copy(update={"warnings": (f"to be settled: {matter}", "thin")}),
+    )
+    document = report(open_one)
+    told = "To be settled before it is built"
+    assert [one.title for one in document.sections][1:3] == ["The answer", told]
+    assert told not in titles
+    assert section_of(document, told).content == [Items([matter])]
+    notes = [getattr(one, "text", "") for one in section_of(document, "Notes and warnings").content]
+    assert "Warning: thin" in notes
+    assert not any(matter in text for text in notes)
 
 
 def test_a_study_is_answered_with_its_gain(study: Path, tmp_path: Path) -> None:
