@@ -129,7 +129,7 @@ def checked(
         design=design,
         tables=tables,
         reasons=reasons,
-        bounds=_in_shop({name: one._asdict() for name, one in ranges.items()}, shop),
+        bounds=holding(_in_shop({k: one._asdict() for k, one in ranges.items()}, shop), design),
         known=tuple(known),
         mesh=mesh,
         chamber=chamber,
@@ -312,6 +312,16 @@ def _heaviest_g(ball_mass: float) -> float:
     most = min(1e3 * MAX_BALLS * ball_mass, HEAVIEST_G)
     digit = _second_digit(most)
     return float(f"{digit * math.floor(most / digit + 1e-9):.6g}")
+
+
+def holding(bounds: dict[str, dict[str, Any]], design: Design) -> dict[str, dict[str, Any]]:
+    """Return the bounds of a study, widened where the design with which it starts is outside."""
+    wide = {}
+    for name, one in bounds.items():
+        ends = {"low": min, "high": max} if "low" in one else {}
+        now = design.value(name)
+        wide[name] = {**one, **{end: pick(one[end], now) for end, pick in ends.items()}}
+    return wide
 
 
 def _in_shop(bounds: dict[str, dict[str, Any]], shop: Shop | None) -> dict[str, dict[str, Any]]:

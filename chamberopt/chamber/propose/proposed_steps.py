@@ -19,6 +19,7 @@ from chamberopt.chamber.propose.held_proposal import bore_clearance_mm
 from chamberopt.chamber.propose.proposal import (
     Proposal,
     faults,
+    holding,
     new_harm,
     propose_charge,
     sonotrode_area,
@@ -305,6 +306,7 @@ def _with_values(made: Proposal, values: Mapping[str, Mapping[str, Any]], steps:
         made,
         design=design,
         tables={name: one for name, one in tables.items() if one or name},
+        bounds=holding(made.bounds, design),
         chamber=chamber,
         jams=max(jams, key=len),
         warnings=tuple(warnings(design, chamber)),

@@ -1,8 +1,9 @@
-"""Tolerances of a proposal: those of ISO 2768-1, class m, and of the amplitude."""
+"""Tolerances of a proposal, by ISO 2768-1 class m and of the amplitude, and its study's bounds."""
 
 import pytest
 
-from chamberopt.chamber.propose.proposal import propose_tolerances
+from chamberopt.chamber.propose.proposal import holding, propose_tolerances
+from tests.helpers.synthetic import plate_design
 
 
 @pytest.mark.parametrize(
@@ -16,3 +17,17 @@ def test_heights_have_those_of_the_standard_by_their_size(height: float, off: fl
         "chamber.sonotrode_distance_mm": 0.1,
         "sonotrode.amplitude_pv_um": 4.0,
     }
+
+
+def test_a_study_holds_the_design_with_which_it_starts() -> None:
+    """A ceiling at 63.5 mm was rounded to 64 mm, so that `run` refused its own study."""
+    design = plate_design(chamber__height_mm=63.5, shot__mass_g=3.0)
+    bounds = {
+        "chamber.height_mm": {"low": 64, "high": 68, "step": 0.5},
+        "shot.mass_g": {"low": 1.0, "high": 2.0, "step": 0.1},
+        "chamber.sonotrode_distance_mm": {"choose": [10.0, 20.0]},
+    }
+    found = holding(bounds, design)
+    assert found["chamber.height_mm"] == {"low": 63.5, "high": 68, "step": 0.5}
+    assert found["shot.mass_g"] == {"low": 1.0, "high": 3.0, "step": 0.1}
+    assert found["chamber.sonotrode_distance_mm"] == {"choose": [10.0, 20.0]}
