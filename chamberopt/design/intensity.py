@@ -50,6 +50,7 @@ INCH_MM = 25.4
 NEAR_ENOUGH = 1.1
 THIN_MM, THICK_MM = 0.090 * INCH_MM, 0.375 * INCH_MM
 STRONG_MPa = 1379.0  # tensile strength of steel: 200,000 psi
+STRONG_HB = 390.0  # hardness of such steel, by the conversions of ASTM A370: by heart
 TABLE = "table VI of SAE AMS-S-13165"
 # From THIN_MM to THICK_MM, and above it [in on A strips].
 _STEEL = (0.008, 0.012), (0.012, 0.016)
@@ -243,12 +244,19 @@ def usual_intensity(alloy: Alloy, thickness: float) -> WantedIntensity | None:
     if ranges is None or 1e3 * thickness < THIN_MM:
         return None
     what = alloy.metal
-    if alloy.metal == "steel" and (alloy.tensile_MPa or 0.0) >= STRONG_MPa:
+    if alloy.metal == "steel" and _is_strong(alloy):
         ranges, what = _STRONG, f"steel from {STRONG_MPa:.0f} MPa on"
     is_thick = 1e3 * thickness > THICK_MM
     low, high = (round(INCH_MM * one, 2) for one in ranges[is_thick])
     edge = f"above {THICK_MM:.3g} mm" if is_thick else f"of {plain(1e3 * thickness, 2)} mm"
     return WantedIntensity(low, high, f"usual for {what} {edge} by {TABLE}")
+
+
+def _is_strong(alloy: Alloy) -> bool:
+    """Return whether the surface of a steel has STRONG_MPa, by its hardness where it is a case."""
+    if alloy.tensile_MPa is None:
+        return (alloy.hardness_HB or 0.0) >= STRONG_HB
+    return alloy.tensile_MPa >= STRONG_MPa
 
 
 def why_none(alloy: Alloy, thickness: float) -> str:

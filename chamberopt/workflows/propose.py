@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,8 +19,6 @@ from chamberopt.chamber.propose.proposed_budget import TooSlowError, measured_bu
 from chamberopt.chamber.propose.proposed_intensity import (
     as_no_wish,
     beside_larger,
-    heavier_wishes,
-    instead_of_steel,
     is_off,
     larger_balls,
     propose_intensity,
@@ -232,8 +230,10 @@ class _Pilots:
             asked = usual_for(made)
         if asked:
             self.begin(INTENSITY)
+            by_geometry = setting_of(made).ball_mm
             try:
-                made, wanted, by_geometry, found = self._for_intensity(made, wanted, asked)
+                made = propose_intensity(made, wanted, asked, self._again, self._predict)
+                found = self._measure(made)
             except InputError:  # which is no reason to stop if nobody asked
                 if not seeks:
                     raise
@@ -259,26 +259,6 @@ class _Pilots:
             return _in_budget(without_finer(coarse[0], why), coarse[1])
         made = beside_larger(made, found, *larger, why)
         return _in_budget(*propose_second_pose(made, found, quietly))
-
-    def _for_intensity(
-        self, made: Proposal, wanted: Wanted, asked: WantedIntensity
-    ) -> tuple[Proposal, Wanted, float, Measured | None]:
-        """Return a proposal for an intensity, with steel or with heavier balls.
-
-        With it are the wishes that it follows from, the diameter of the balls by geometry alone
-        [mm], and what a pilot measured of it; None if nothing.
-
-        Raises InputError if the intensity cannot be told.
-        """
-        by_geometry = setting_of(made).ball_mm
-        made = propose_intensity(made, wanted, asked, self._again, self._predict)
-        found = self._measure(made)
-        if (other := heavier_wishes(made, wanted, asked, found, by_geometry)) is not None:
-            with suppress(InputError):  # which is no reason to stop: steel balls do something
-                heavy, _, ball_mm, told = self._for_intensity(self._again(other), other, asked)
-                if (better := instead_of_steel(made, found, heavy, told, asked)) is not None:
-                    return better, other, ball_mm, told
-        return made, wanted, by_geometry, found
 
     def _again(self, other: Wanted) -> Proposal:
         with no_steps():  # those of the first proposal, again

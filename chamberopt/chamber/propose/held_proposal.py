@@ -178,7 +178,7 @@ def masked(bare: Proposal, floor: Floor, bores: Sequence[Bore], shop: Shop | Non
         return bare
     if holes and are_holes(bare.mesh, bare.known, names, holes):
         sizes = ", ".join(f"{2e3 * one.radius:.3g}" for one in holes)
-        text = f"in holes of {sizes} mm, not to be peened, or open to the outside"
+        text = f"plugs in holes of {sizes} mm, not to be peened, or open to the outside"
         keys: dict[str, Any] = {"plugs": True, "at": {"faces": [one.wall for one in holes]}}
     else:
         text = f"a cap on {', '.join(names)}: not to be peened, by the name"

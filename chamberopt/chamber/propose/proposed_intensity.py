@@ -30,7 +30,7 @@ from chamberopt.chamber.propose.proposed_setting import (
     settings_of,
     with_amplitude,
 )
-from chamberopt.chamber.propose.shop import HARD, STEEL, usual_shop
+from chamberopt.chamber.propose.shop import usual_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.design.almen_strip import OVER_A
@@ -42,7 +42,7 @@ from chamberopt.design.intensity import (
     usual_intensity,
     why_none,
 )
-from chamberopt.design.materials import alloy, ball
+from chamberopt.design.materials import alloy
 from chamberopt.geometry.thickness import depth_below
 
 MOST_PILOTS = 5
@@ -50,7 +50,6 @@ ON_N = 0.1016  # mmA: 0.004 in, below which N strips are taken (SAE J443)
 INTENSITY = "process.intensity_mmA"  # whose reason stands in a design without a wish too
 MOST_LISTED = 3  # other settings in a reason
 LARGER = "LARGER BALLS FOR THE INTENSITY"
-HEAVY_FOR = "steel", "nickel"  # metals of parts on which heavier balls than steel may be proposed
 
 
 class IntensityPilot(NamedTuple):
@@ -192,69 +191,6 @@ def larger_balls(
     other = _with_prediction(other, intensity, told.intensity)
     reason = f"larger ones for the intensity: {now.in_words} give {_about(found)}"
     return replace(other, reasons={**other.reasons, "shot.diameter_mm": reason}), told
-
-
-def heavier_wishes(
-    made: Proposal,
-    wanted: Wanted,
-    intensity: WantedIntensity,
-    found: Measured | None,
-    by_geometry: float,
-) -> Wanted | None:
-    """Return wishes for heavier balls, where steel balls that serve the target are a bit too weak.
-
-    By Kirk's formula (coverage/dents.py) the strength of an impact goes with the root of the ball's
-    density, so that heavier balls may be smaller. It is None where steel does, where heavier balls
-    of the size that serves the target would be too weak too, where a material or size was asked
-    for, and for metals on which such balls are not usual.
-
-    Args:
-        found: what a pilot measured of the proposal; None if nothing.
-        by_geometry: diameter of the balls that geometry alone would give [mm].
-    """
-    shop, material = wanted.shop or usual_shop(), made.tables["shot"]["material"]
-    is_open = not wanted.shot and wanted.ball_mm is None and material == STEEL and shop.has(HARD)
-    if not is_open or alloy(made.tables["materials"]["part"]).metal not in HEAVY_FOR:
-        return None
-    if found is None or found.intensity is None:
-        return None
-    leaves_out = LARGER in made.reasons["shot.diameter_mm"]
-    if intensity.off(found.intensity.value) >= 0.0 and not leaves_out:
-        return None
-    most = Setting(by_geometry, max(amplitudes_of(made.sonotrode)[1]))
-    of_serving = expected_intensity(most, {setting_of(made): found.intensity.value})
-    heavier = math.sqrt(ball(HARD).density_kg_m3 / ball(STEEL).density_kg_m3)
-    return replace(wanted, shot=HARD) if intensity.off(heavier * of_serving) >= 0.0 else None
-
-
-def instead_of_steel(
-    steel: Proposal,
-    found: Measured | None,
-    heavy: Proposal,
-    told: Measured | None,
-    intensity: WantedIntensity,
-) -> Proposal | None:
-    """Return a proposal with heavier balls, if they do more for the intensity than steel ones.
-
-    They serve more of the target, and are no farther off; or they serve as much, and are nearer.
-
-    Args:
-        found, told: what pilots measured of both; None if nothing.
-    """
-    if found is None or told is None or found.intensity is None or told.intensity is None:
-        return None
-    balls = [setting_of(one).ball_mm for one in (steel, heavy)]
-    served = [fit_sizes(steel.chamber.part, [1e-3 * one])[0].served for one in balls]
-    values = found.intensity.value, told.intensity.value
-    gain, off = served[1] - served[0], [abs(intensity.off(one)) for one in values]
-    if not ((gain > AS_GOOD and off[1] <= off[0]) or (gain > -AS_GOOD and off[1] < off[0])):
-        return None
-    text, other = (
-        f"{setting_of(one).in_words} {_about(pilot)} on the {share:.0%} that they serve"
-        for one, pilot, share in zip((heavy, steel), (told, found), served[::-1], strict=True)
-    )
-    reason = f"heavier, for the intensity: {text}; of steel {other} (--shot steel takes these)"
-    return replace(heavy, reasons={**heavy.reasons, "shot.material": reason})
 
 
 def beside_larger(

@@ -52,10 +52,9 @@ from chamberopt.common.number_text import plain, rounded
 
 RAISED = 1.0, 2.0, 3.0  # ball diameters by which a ceiling is raised for a second pose
 # When two sizes pay, by heart: coarse balls serve MOSTLY of the target, their intensity is so many
-# times that of the finer ones, and these serve so much more of the target, or take less than half
-# of the time. For fillets, where parts fail, and for what coarse balls leave bare, they pay in any
-# case.
-STRONGER, MUCH = 1.5, 0.15
+# times that of the finer ones, and these serve more of the target in less time. For fillets, where
+# parts fail, and for what coarse balls leave bare, they pay in any case.
+STRONGER = 1.5
 Steps = list[dict[str, Any]]
 """The [[steps]] of a design file."""
 
@@ -195,7 +194,7 @@ def with_finer_balls(
         budgets = [measured_budget(coarse, found), measured_budget(finer, after)]
         left_bare = 1.0 - touched_area(coarse) / touched_area(finer)
         is_needed = for_fillets or left_bare > AS_GOOD
-        if not is_needed and gain < MUCH and budgets[1].treatment >= budgets[0].treatment:
+        if not is_needed and budgets[1].treatment >= budgets[0].treatment:
             longer = f"{rounded(budgets[1].treatment, 3)} s more for {gain:.0%} of the target"
             return None, f"{longer} do not pay: {shares}"
         two = _one_after_the_other(coarse, finer, budgets)

@@ -247,7 +247,7 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         return f"; after it {' and '.join(texts)}" if texts else ""
 
     def by_size(text: str, others: Sequence[Surface]) -> str:
-        return f"{text}{beside(others)}{f'; {BY_SIZE}' if others else ''}"
+        return f"{text}{beside(others)}; {BY_SIZE}"
 
     special = [
         one

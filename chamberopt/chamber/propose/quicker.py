@@ -4,7 +4,7 @@ A part that stands on one sonotrode is dented slowly at its upper end, as few ba
 or on edge, over several sonotrodes if it is long, it may take a fifth of the time. A whole layer of
 balls dents faster than half a layer in a roomy chamber, and slower where the balls are in each
 other's way. So all of these are tried, and what is proposed was simulated itself. A part on whose
-upper side balls come to rest is turned over after half of the time.
+upper side balls come to rest, or few get to, is tried turned over after half of the time.
 """
 
 from __future__ import annotations
@@ -13,22 +13,24 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from chamberopt.chamber.propose.held_proposal import rests
-from chamberopt.chamber.propose.pose import AT_SIDE
+from chamberopt.chamber.propose.pose import AT_SIDE, Pose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, new_harm, with_charge
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS
-from chamberopt.chamber.propose.proposed_budget import LONG, Measured, TooSlowError
+from chamberopt.chamber.propose.proposed_budget import Measured, TooSlowError
 from chamberopt.common.errors import InputError
+from chamberopt.common.number_text import plain
 from chamberopt.geometry.triangles import rotation_matrix
 
 SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways are tried
-# Time over that of the way before, below which a way is taken: with more sonotrodes, or with as
-# many, and where that time is LONG. Pilots know a time to 10 to 20 %.
-DEARER, QUICKER = 0.6, 0.8
+# Time of all sonotrodes over that of the way before, below which a way is taken. Pilots know a time
+# to 10 to 20 %. A way is no weaker than this share of the intensity before.
+QUICKER, AS_STRONG = 0.8, 0.8
 LAYER = 2.0  # over half a layer
 SAME = 0.999  # cosine between the directions that point up, from which on a pose is no other one
 
@@ -53,20 +55,24 @@ def propose_quicker(
         measure: simulates a proposal briefly; None if that cannot be done. Raises TooSlowError if
             the time to 98 % is longer than a given one [s].
     """
-    best, tried = first, []
+    best = first
+    tried: list[tuple[Way, str]] = []
     if _is_slow(first) and first.wanted.pose is None and not turns(first.made):
-        for pose in AT_SIDE:
+        for pose, over in product(AT_SIDE, (False, True)):
+            if over and not (tried and _needs_both_sides(tried[-1][0], pose)):
+                continue
+            wanted = replace(first.wanted, pose=pose, turned_over=over)
             try:
-                made, wanted = _in_pose(replace(first.wanted, pose=pose), again)
+                made = again(wanted)
             except InputError:
                 continue
             if float(_up(made) @ _up(first.made)) > SAME:
                 continue
-            harm = _harm(made, first.made)
+            harm, found = _harm(made, first.made), None
             try:
                 found = None if harm else measure(made, longest_of_choice(best.found))
             except TooSlowError as error:
-                found, harm = None, str(error)
+                harm = str(error)
             one = Way(made, wanted, found)
             tried.append((one, harm))
             if not harm and _is_quicker(one, best):
@@ -88,17 +94,10 @@ def propose_quicker(
     return best
 
 
-def _in_pose(wanted: Wanted, again: Callable[[Wanted], Proposal]) -> tuple[Proposal, Wanted]:
-    """Return a proposal for wishes, turned over if balls come to rest on the part, and its wishes.
-
-    Raises InputError if the chamber cannot be built.
-    """
-    made = again(wanted)
-    if rests(made):
-        over = replace(wanted, turned_over=True)
-        with suppress(InputError):  # what holds it in one pose alone is told of this one
-            return again(over), over
-    return made, wanted
+def _needs_both_sides(one: Way, pose: Pose) -> bool:
+    """Return whether a way in a pose leaves out what looks up: balls rest there, or few come."""
+    is_rough = one.found is not None and not one.found.places
+    return one.wanted.pose == pose and (is_rough or rests(one.made))
 
 
 def longest_of_choice(found: Measured | None) -> float:
@@ -128,11 +127,17 @@ def _harm(made: Proposal, first: Proposal) -> str:
 
 
 def _is_quicker(one: Way, other: Way) -> bool:
-    """Return whether a way is worth taking instead of another one."""
+    """Return whether a way is worth taking instead of another one.
+
+    A way on twice as many sonotrodes, which have to vibrate alike, has to take half of the time.
+    """
     if one.found is None or other.found is None or one.found.places < other.found.places:
         return False
-    is_dear = _sonotrodes(one.made) > _sonotrodes(other.made) and other.found.time_to_98 < LONG
-    return one.found.time_to_98 < (DEARER if is_dear else QUICKER) * other.found.time_to_98
+    now, then = one.found.intensity, other.found.intensity
+    if now is not None and then is not None and now.value < AS_STRONG * then.value:
+        return False
+    ratio = max(_sonotrodes(one.made) / _sonotrodes(other.made), 1.0)
+    return ratio * one.found.time_to_98 < QUICKER * other.found.time_to_98
 
 
 def _sonotrodes(made: Proposal) -> int:
@@ -141,7 +146,10 @@ def _sonotrodes(made: Proposal) -> int:
 
 
 def _said(found: Measured | None) -> str:
-    return "no pilot" if found is None else found.in_words
+    if found is None:
+        return "no pilot"
+    weak = "" if found.intensity is None else f", {plain(found.intensity.value, 2)} mmA"
+    return f"{found.in_words}{'' if found.places else ' on average, its places not resolved'}{weak}"
 
 
 def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:

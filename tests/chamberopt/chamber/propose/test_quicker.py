@@ -20,6 +20,7 @@ from chamberopt.chamber.propose.proposed_budget import Measured, TooSlowError
 from chamberopt.chamber.propose.proposed_steps import propose_second_pose, turned_over
 from chamberopt.chamber.propose.quicker import Way, propose_quicker
 from chamberopt.chamber.propose.text import design_text
+from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.load import load_design
 from chamberopt.geometry.triangles import rotation_matrix
 
@@ -164,11 +165,30 @@ def test_more_sonotrodes_must_save_more_time(poses: dict[Pose | None, Proposal])
     blocks = poses["on-edge"].design.sonotrode.blocks
     assert blocks is not None
     assert blocks.count > 1
-    for share, taken in ((0.7, None), (0.5, "on-edge")):
+    assert poses[None].design.sonotrode.blocks is None
+    for share, taken in ((0.85 / blocks.count, None), (0.75 / blocks.count, "on-edge")):
         first = Way(poses[None], Wanted("mm"), measured(1000.0))
         measure = pilots({None: 1000.0, "lying": 2000.0, "on-edge": share * 1000.0})
         best = propose_quicker(first, lambda one: poses[one.pose], measure)
         assert best.wanted.pose == taken
+
+
+def test_a_quicker_way_is_no_weaker(poses: dict[Pose | None, Proposal]) -> None:
+    first = Way(poses[None], Wanted("mm"), with_intensity(measured(2000.0), 0.2))
+    for value, taken in ((0.15, None), (0.17, "on-edge")):
+        times: dict[Pose | None, float] = {None: 2000.0, "lying": 1990.0, "on-edge": 300.0}
+        measure = pilots(times)
+        best = propose_quicker(
+            first,
+            lambda one: poses[one.pose],
+            lambda *given, m=measure, x=value: with_intensity(m(*given), x),
+        )
+        assert best.wanted.pose == taken
+        assert f"98 % after about 300 s, {value:g} mmA" in best.made.reasons["part.rotate_deg"]
+
+
+def with_intensity(found: Measured, value: float) -> Measured:
+    return found._replace(intensity=PredictedIntensity(value, 0.5 * value, 2.0 * value, 2.5))
 
 
 @pytest.mark.parametrize("share", [0.7, 0.9])
