@@ -40,7 +40,9 @@ FLAT_DEG = 1.0  # largest angle in a flat face: fillets beside it are no part of
 MOST_FACES = 40  # flat faces that are looked at, the largest
 UP, LEVEL = 0.98, -0.1  # upward component of the normal of a face on top, and of one at the side
 HIGHER = 1e-4  # m: what is higher than a face by more stands in the way of a rod on it
-CLEAR = 2.0  # ball diameters between a holder and the target, so that balls get there
+# Ball diameters between a holder and the target, so that balls get there, and between it and the
+# target on an end that is left bare for it, which it grips as far as it can.
+CLEAR, BESIDE_END = 2.0, 1.0
 # Of an end that is enclosed: how much wider it may get, over its outermost face; least length over
 # its width; most length over the part's.
 WIDER, SHORTEST, LONGEST = 2.0, 0.25, 0.4
@@ -301,7 +303,7 @@ def end_holder(
     if not target.any():
         return None
     corners = (mesh.vertices @ rotation_matrix(turns).T)[mesh.triangles]
-    return _of_end(corners, end, target, CLEAR * ball, "up")
+    return _of_end(corners, end, target, BESIDE_END * ball, "up")
 
 
 def _of_end(
