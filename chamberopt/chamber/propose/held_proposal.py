@@ -290,4 +290,5 @@ def _extremes(bounds: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
     }
     distance = "chamber.sonotrode_distance_mm"
     low, high = ({name: one[k] for name, one in ends.items()} for k in (0, -1))
-    return [{**low, distance: high[distance]}, {**high, distance: low[distance]}]
+    far, near = ({name: one[name] for name in one if name == distance} for one in (high, low))
+    return [{**low, **far}, {**high, **near}]

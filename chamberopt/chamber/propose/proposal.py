@@ -315,13 +315,16 @@ def _heaviest_g(ball_mass: float) -> float:
 
 
 def holding(bounds: dict[str, dict[str, Any]], design: Design) -> dict[str, dict[str, Any]]:
-    """Return the bounds of a study, widened where the design with which it starts is outside."""
+    """Return the bounds of a study, widened where the design with which it starts is outside.
+
+    What has no range then does not vary.
+    """
     wide = {}
     for name, one in bounds.items():
         ends = {"low": min, "high": max} if "low" in one else {}
         now = design.value(name)
         wide[name] = {**one, **{end: pick(one[end], now) for end, pick in ends.items()}}
-    return wide
+    return {name: one for name, one in wide.items() if "low" not in one or one["low"] < one["high"]}
 
 
 def _in_shop(bounds: dict[str, dict[str, Any]], shop: Shop | None) -> dict[str, dict[str, Any]]:

@@ -141,7 +141,8 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     # The upper half of a round surface is no face that could be left out.
     of_faces = np.any([one.triangles for one in whole], axis=0) & away
     share = area[away].sum() / area[target].sum()
-    if share > LEAST and area[of_faces].sum() > 0.5 * area[away].sum():
+    is_turned = any(one.part for one in proposal.design.steps or ())
+    if share > LEAST and area[of_faces].sum() > 0.5 * area[away].sum() and not is_turned:
         named = ", ".join(one.name for one in whole[:MOST_NAMED])
         direction = [round(float(x), 4) + 0.0 for x in down]
         keys: dict[str, object] = {"direction": direction, "angle_deg": [0.0, AWAY_DEG]}

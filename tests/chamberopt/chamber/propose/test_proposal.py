@@ -26,8 +26,10 @@ def test_a_study_holds_the_design_with_which_it_starts() -> None:
         "chamber.height_mm": {"low": 64, "high": 68, "step": 0.5},
         "shot.mass_g": {"low": 1.0, "high": 2.0, "step": 0.1},
         "chamber.sonotrode_distance_mm": {"choose": [10.0, 20.0]},
+        "shot.diameter_mm": {"low": 3.0, "high": 3.0, "step": 0.5},  # which the design has
     }
     found = holding(bounds, design)
+    assert "shot.diameter_mm" not in found
     assert found["chamber.height_mm"] == {"low": 63.5, "high": 68, "step": 0.5}
     assert found["shot.mass_g"] == {"low": 1.0, "high": 3.0, "step": 0.1}
     assert found["chamber.sonotrode_distance_mm"] == {"choose": [10.0, 20.0]}
