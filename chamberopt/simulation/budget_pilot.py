@@ -119,11 +119,13 @@ def measure_budget(
     executor: Executor,
     progress: Progress | None = None,
     longest: float = math.inf,
+    is_brief: bool = False,
 ) -> Measured:
     """Simulate a design briefly, and return what its budget follows from.
 
     Args:
         longest: time to 98 % [s] above which nothing more is wanted.
+        is_brief: the shot need not settle, as one of several designs is chosen first.
     Raises:
         TooSlowError: the design takes longer than that.
         InputError: the shot does not fit, the target has no figures, or it was not hit.
@@ -161,7 +163,7 @@ def measure_budget(
         if least > longest:
             raise TooSlowError(f"98 % after more than {rounded(least, 1)} s")
         collisions = sum(one.replica.collisions["total"] for one in timed)
-        most = COLLISIONS if settled else UNSETTLED
+        most = COLLISIONS if settled or is_brief else UNSETTLED
         if (settled and hits >= DENTS / WIDEST) or GROWTH * collisions > most:
             break
         time *= GROWTH

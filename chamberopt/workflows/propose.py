@@ -221,7 +221,10 @@ class _Pilots:
         self.begin(TIME)
         way = Way(first, self.wishes.geometry, self._measure(first))
         self.begin(WAYS)
-        made, wanted, found = propose_quicker(way, self._again, quietly)
+        briefly = partial(quietly, is_brief=True)
+        made, wanted, found = propose_quicker(way, self._again, briefly)
+        if found is not None and not found.settled and made.design != first.design:
+            found = quietly(made)
         why_so = {"part.rotate_deg": made.reasons["part.rotate_deg"]}  # with poses that were tried
         intensity, asked = self.wishes.intensity, self.wishes.asked_intensity()
         # A stated alloy has a usual intensity, which a proposal should not miss.
@@ -266,18 +269,22 @@ class _Pilots:
             return turned_over(made) if other.turned_over else made
 
     def _measure(
-        self, made: Proposal, longest: float = math.inf, is_told: bool = True
+        self,
+        made: Proposal,
+        longest: float = math.inf,
+        is_told: bool = True,
+        is_brief: bool = False,
     ) -> Measured | None:
         """Return what the budget of a proposal follows from; None where no pilot can tell it.
 
-        The reason is told then, unless is_told is false. Raises TooSlowError if the time to 98 % is
-        longer than `longest` [s].
+        The reason is told then, unless is_told is false. `longest` [s] and `is_brief` are those of
+        `measure_budget`. Raises TooSlowError if the time to 98 % is longer.
         """
         try:
             self.teller.compile(made.design, made.chamber, None)
             with self.teller.step("pilot run") as progress:
                 given = made.design, made.chamber, self.executor, progress
-                return measure_budget(*given, longest)
+                return measure_budget(*given, longest, is_brief)
         except TooSlowError:
             raise
         except (InputError, SimulationError) as error:

@@ -117,7 +117,7 @@ def turned_over(made: Proposal) -> Proposal:
         raise InputError(text) from None
     if any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air:
         raise InputError("nothing would hold it")
-    reason = "turned over after half of the time, as balls come to rest on what looks up"
+    reason = "turned over after half of the time, as what looks up gets few dents"
     return replace(two, reasons={**two.reasons, ".steps": reason})
 
 

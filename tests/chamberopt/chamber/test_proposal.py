@@ -180,7 +180,7 @@ def test_what_faces_away_is_offered_for_leaving_out(
     made = SimpleNamespace(
         mesh=mesh,
         known=known,
-        design=SimpleNamespace(part=part),
+        design=SimpleNamespace(part=part, steps=None),
         chamber=SimpleNamespace(part=posed),
         tables={"part": {"mesh": str(tmp_path / "gear.obj")}, "part.target": target.keys},
         reasons={},
