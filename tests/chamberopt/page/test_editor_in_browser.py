@@ -147,7 +147,7 @@ def test_the_face_of_a_cad_file_lights_up_and_is_taken(opened: Page, tmp_path: P
         page = Page(opened.page.context.browser, served)
         page.wait("data-checked")
         page.tab("target")
-        expect(page.page.locator("#of-cad")).to_be_visible()
+        expect(page.page.locator("#of-cad")).to_be_visible(timeout=WAIT)
         expect(page.page.locator("#of-crease")).to_be_hidden()
         mesh = read_part(part, "in")
         fillets = next(one for one in surfaces(mesh) if one.name.startswith("fillets"))
@@ -155,9 +155,9 @@ def test_the_face_of_a_cad_file_lights_up_and_is_taken(opened: Page, tmp_path: P
         page.page.mouse.move(*seen[1:])
         own = mesh.faces(None).of_triangle
         count = str(int((own == own[seen[0]]).sum()))
-        expect(page.page.locator("#view")).to_have_attribute("data-highlight", count)
+        expect(page.page.locator("#view")).to_have_attribute("data-highlight", count, timeout=WAIT)
         page.page.mouse.click(*seen[1:])
-        expect(page.page.locator("#chosen")).to_contain_text('"cad_face":true')
+        expect(page.page.locator("#chosen")).to_contain_text('"cad_face":true', timeout=WAIT)
         assert not page.errors
     finally:
         served.process.kill()
