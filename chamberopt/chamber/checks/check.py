@@ -33,13 +33,11 @@ from chamberopt.common.errors import one_line
 from chamberopt.common.number_text import plain
 from chamberopt.design.almen_strip import USUAL_K_LOG_SD
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE
-from chamberopt.geometry.triangles import area_vectors, areas, edge_keys, sides_of, unit_vectors
+from chamberopt.geometry.triangles import areas, edge_keys, sides_of, unit_normals
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from chamberopt.chamber.build import Chamber
-    from chamberopt.chamber.part import Axis, Part
+    from chamberopt.chamber.part import Axis
     from chamberopt.design.load import Design
     from chamberopt.design.sonotrode import VibratingFace
     from sim_core import TriangleMesh
@@ -121,13 +119,15 @@ def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
     part, found, steps = chamber.part, {}, design.in_steps
     shares, balls = np.zeros(len(part.triangles)), set()
     finest = min(max(one.shot.diameters) for one in steps.values())
-    for (name, one), room in zip(steps.items(), chamber.steps, strict=True):
+    posed = (room.part.vertices[room.part.triangles] for room in chamber.steps)
+    down = np.array([unit_normals(corners)[:, 2] < -DOWN for corners in posed])
+    for (name, one), room, now in zip(steps.items(), chamber.steps, down, strict=True):
         reach = shot_reach(one, room)
         own = reached_part_share(reach, room.source, len(part.triangles))
         shares = np.maximum(shares, own * room.exposed_area)
         balls.add(f"{1e3 * reach.diameter:g}")
-        others = [other.part for other in chamber.steps if other is not room]
-        first = first_warnings(one, room, reach.mesh, of_surfaces=False, in_other_steps=others)
+        turned_down = down.sum(axis=0) > now  # what looks down in another step
+        first = first_warnings(one, room, reach.mesh, False, turned_down)
         texts = [*_wall_warnings(one, room, reach), *first]
         if max(one.shot.diameters) == finest:
             texts += fillet_warnings(reach, room, finest)
@@ -153,7 +153,7 @@ def first_warnings(
     chamber: Chamber,
     mesh: TriangleMesh,
     of_surfaces: bool = True,
-    in_other_steps: Sequence[Part] = (),
+    turned_down: np.ndarray | None = None,
 ) -> list[str]:
     """Return the warnings that do not depend on where the shot reaches the surface.
 
@@ -161,7 +161,7 @@ def first_warnings(
         mesh: surface of the chamber.
         of_surfaces: whether a target that is partly outside the chamber is warned of. One of
             several steps need not have all of it inside.
-        in_other_steps: the part as it stands in the design's other steps.
+        turned_down: as of `find_ledges`.
     """
     shot = design.shot
     texts = _sonotrode_warnings(design, mesh, turning_axis(design, chamber.part))
@@ -181,10 +181,7 @@ def first_warnings(
             )
     texts += _mask_warnings(chamber)
     texts += _side_wall_warnings(design, chamber)
-    looks = (unit_vectors(area_vectors(one.vertices, one.triangles)) for one in in_other_steps)
-    turned_down = np.any([normal[:, 2] < -DOWN for normal in looks], axis=0)
-    ledges = find_ledges(design, chamber, turned_down if in_other_steps else None)
-    texts += [ledge.message for ledge in ledges if ledge.level]
+    texts += [one.message for one in find_ledges(design, chamber, turned_down) if one.level]
     path = free_path(design, chamber)
     if not design.effects.ball_collisions and path < MIN_FREE_PATH:
         texts.append(

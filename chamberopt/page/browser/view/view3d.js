@@ -260,6 +260,10 @@ class View3D {
   // Look at a place from an eye; what is within `size` of it fills the view.
   look({ middle, eye, size }) {
     this.home = { middle, eye, size };
+    this.#aim(this.home);
+  }
+
+  #aim({ middle, eye, size }) {
     this.orbit.target.set(...middle);
     this.camera.position.set(...eye);
     this.camera.near = size / 200;
@@ -272,9 +276,7 @@ class View3D {
   // Look along a way [x, y, z], with z up, at what the view looked at first; from the first eye without one.
   from(way) {
     const { middle, eye, size } = this.home, far = Math.hypot(...eye.map((x, i) => x - middle[i]));
-    const home = this.home;
-    this.look({ middle, size, eye: way ? middle.map((x, i) => x + far * way[i]) : eye });
-    this.home = home;
+    this.#aim({ middle, size, eye: way ? middle.map((x, i) => x + far * way[i]) : eye });
   }
 
   // Turn as another view does.
