@@ -233,8 +233,7 @@ class Comparison:
         if standing == NOT_DECIDED:
             shown = float(f"{predicted.value:.2g}")  # as it is told
             where = INSIDE if wanted[0] <= shown <= wanted[1] else OUTSIDE
-            other = OUTSIDE if where == INSIDE else INSIDE
-            words = f"{NOT_DECIDED}: expected {where}, but its interval reaches {other}"
+            words = f"{NOT_DECIDED}: the estimate lies {where}, but is known too roughly to tell"
         return cls(standing, words, predicted.in_words)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
@@ -35,7 +34,7 @@ from chamberopt.documents.study import (
     search_section,
 )
 from chamberopt.documents.tolerances import tolerance_section
-from chamberopt.documents.wording import metric_label, objective_label, plain
+from chamberopt.documents.wording import metric_label, objective_label, plain, value_text
 from chamberopt.documents.zones import steps_section, zones_section
 from chamberopt.pictures.part3d import part_scene
 from chamberopt.results.load import START, load_start, load_trials
@@ -272,7 +271,9 @@ def _effect_text(name: str, value: object) -> str:
     if name == "flexure" and isinstance(value, Mapping) and not value["on"]:
         return "off"
     if isinstance(value, Mapping):
-        return ", ".join(f"{key} = {_text(one)}" for key, one in value.items() if one is not None)
+        return ", ".join(
+            f"{key} = {value_text(one)}" for key, one in value.items() if one is not None
+        )
     if name == "rest" and value is None:
         return "on where a still surface faces up"
     if name == "flexure" and value is None:
@@ -307,9 +308,9 @@ def _design(result: Result, start: Result | None) -> Section:
     after = _design_values(result)
     before = _design_values(start) if start else after
     changed = [
-        (name, before.get(name, _text(None)), value)
+        (name, before.get(name, value_text(None)), value)
         for name, value in after.items()
-        if before.get(name, _text(None)) != value
+        if before.get(name, value_text(None)) != value
     ]
     content: list[Block] = []
     if changed:
@@ -331,7 +332,7 @@ def _design_values(result: Result) -> dict[str, str]:
     """
     design = dict(_flatten(result.record.design))
     design["part.mesh"] = result.design.part.mesh_path.name
-    return {name: _text(value) for name, value in design.items()}
+    return {name: value_text(value, 6) for name, value in design.items()}
 
 
 def _flatten(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
@@ -340,16 +341,6 @@ def _flatten(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[st
             yield from _flatten(value, f"{prefix}{name}.")
         elif value not in ([], None):
             yield prefix + name, value
-
-
-def _text(value: object) -> str:
-    if value is None:
-        return "–"
-    if isinstance(value, str):
-        return value
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.6g}" if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
 
 
 def _made_with(result: Result) -> Section:

@@ -27,7 +27,7 @@ from chamberopt.documents.report import limits_of_intervals, notes_of
 from chamberopt.documents.study import exposed_target
 from chamberopt.documents.tolerances import sheet_rows
 from chamberopt.documents.wanted import wanted_lines, wanted_rows
-from chamberopt.documents.wording import metric_label, plain
+from chamberopt.documents.wording import metric_label, plain, value_text
 from chamberopt.documents.zones import turned
 from chamberopt.results.load import load_start
 
@@ -410,15 +410,10 @@ def key_row(key: str, value: Any) -> Row:
 
     In `key`, the unit is the end of the name, e.g. "height_mm".
     """
-    if isinstance(value, bool):
-        text = "yes" if value else "no"
-    elif isinstance(value, int | float):
-        text = f"{plain(value)} {unit_of(key)}".rstrip()
-    else:
-        names = value if isinstance(value, list) else [value]
-        is_text = all(isinstance(one, str) for one in names)
-        text = ", ".join(names) if is_text else "see the report"
-    return in_words(key), text
+    parts = value if isinstance(value, list) else [value]
+    if any(isinstance(one, list | dict) for one in parts):
+        return in_words(key), "see the report"
+    return in_words(key), f"{value_text(value)} {unit_of(key)}".rstrip()
 
 
 def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -122,6 +123,19 @@ def plain(value: float | str, digits: int = 4) -> str:
     Only very large and very small numbers have an exponent.
     """
     return number_text.typeset_plain(value, digits)
+
+
+def value_text(value: object, digits: int = 4) -> str:
+    """Return a value of a file as text: yes or no, numbers and words, joined by commas."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return plain(value, digits)
+    if isinstance(value, list | tuple):
+        return ", ".join(value_text(one, digits) for one in value)
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, dict) else str(value)
 
 
 def with_unit(value: float, unit: str = "") -> str:

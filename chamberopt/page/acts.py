@@ -28,7 +28,7 @@ from chamberopt.documents.answer import on_average
 from chamberopt.documents.comparison import comparison_end
 from chamberopt.documents.report import answer_section
 from chamberopt.documents.study import aim_in_words
-from chamberopt.documents.wording import plain
+from chamberopt.documents.wording import value_text
 from chamberopt.page.answers import part_answer, shape_answer, step_texts, surface_answer
 from chamberopt.page.checker import Checker
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
@@ -98,20 +98,12 @@ def _differences(results: Sequence[Result]) -> list[str]:
     names = [name for name in found if "." in name and not name.startswith("process.accuracy.")]
     return [
         ", ".join(
-            f"{inner_first(name)} {f'{_value(found[name][k])} {unit_of(name)}'.rstrip()}"
+            f"{inner_first(name)} {f'{value_text(found[name][k])} {unit_of(name)}'.rstrip()}"
             for name in names[:MOST_VALUES]
             if found[name][k] is not None
         )
         for k in range(len(results))
     ]
-
-
-def _value(given: object) -> str:
-    if isinstance(given, list | tuple):
-        return ", ".join(map(_value, given))
-    if isinstance(given, bool):
-        return "yes" if given else "no"
-    return plain(given) if isinstance(given, int | float) else str(given)
 
 
 def shown(folders: Sequence[Path]) -> dict[str, object]:

@@ -228,8 +228,8 @@ def _said_of_treatment(found: Measured, treatment: float, coverage_percent: floa
     multiple = rounded(treatment / found.time_to_98, 2)
     return (
         f"an estimate, rounded up: after about {rounded(found.time_to_98, 2)}{spread} s {what}"
-        f"{friction}, by a pilot of {rounded(found.simulated, 2)} simulated s{wanted}{more}: "
-        f"{multiple} times the time to 98 %{long}"
+        f"{friction}, by a pilot of {rounded(found.simulated, 2)} simulated s{wanted}{more}, "
+        f"in all {multiple} times as long{long}"
     )
 
 

@@ -64,7 +64,7 @@ def test_the_treatment_time_is_rounded_up_and_says_what_it_rests_on() -> None:
     said = budget.reasons["process.treatment_time_s"]
     assert said.startswith("an estimate, rounded up: after about 250 ± 60 s 95 % of the target is")
     assert "slow end of friction" in said
-    assert said.endswith("simulated s, and 30% more: 1.4 times the time to 98 %")
+    assert said.endswith("simulated s, and 30% more, in all 1.4 times as long")
     assert budget.search_time == pytest.approx(REPLICAS * budget.time, rel=0.5)
     of_mean = propose_budget(PILOT._replace(places=False, friction=False))
     said = of_mean.reasons["process.treatment_time_s"]
