@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING, Any, TextIO
 if TYPE_CHECKING:
     from rich.progress import Progress as Display
 
-# Called as progress(done, total, best value so far or None); total is 0 where it is not known.
-Progress = Callable[[int, int, "float | None"], None]
+# Called as progress(done, total, best value so far or None); total is 0 where it is not known. What
+# is done may hold parts of an item.
+Progress = Callable[[float, int, "float | None"], None]
 
 # s until a step gets a line in a log; each further line comes after twice the time
 FIRST_LINE = 30.0
@@ -96,7 +97,7 @@ def step(
             display.remove_task(row)
 
 
-def untold(done: int, total: int, best: float | None) -> None:
+def untold(done: float, total: int, best: float | None) -> None:
     """Ignore the progress of a step that is not shown."""
 
 
@@ -112,9 +113,9 @@ def _is_notebook() -> bool:
     return Console().is_jupyter
 
 
-def _update(display: Display, row: Any, done: int, total: int, best: float | None) -> None:
+def _update(display: Display, row: Any, done: float, total: int, best: float | None) -> None:
     best_text = "" if best is None else f"best {best:.4f}"
-    count, left = (f"{done:,}/{total:,}", "left") if total else (f"{done:,} so far", "")
+    count, left = (f"{int(done):,}/{total:,}", "left") if total else (f"{int(done):,} so far", "")
     display.update(row, completed=done, total=total or None, count=count, best=best_text, left=left)
 
 
@@ -152,11 +153,11 @@ def _display(stream: TextIO) -> Iterator[Display]:
 def _json_writer(what: str, stream: TextIO) -> Progress:
     due = 0.0
 
-    def write(done: int, total: int, best: float | None) -> None:
+    def write(done: float, total: int, best: float | None) -> None:
         nonlocal due
         if time.monotonic() >= due or done == total:
             due = time.monotonic() + LEAST_PAUSE
-            found = {"step": what, "done": done, "total": total, "best": best}
+            found = {"step": what, "done": round(done, 2), "total": total, "best": best}
             print(json.dumps(found), file=stream, flush=True)
 
     return write
@@ -166,7 +167,7 @@ def _log_lines(what: str, stream: TextIO) -> Progress:
     begun = time.monotonic()
     due, first = begun + FIRST_LINE, None
 
-    def write(done: int, total: int, best: float | None) -> None:
+    def write(done: float, total: int, best: float | None) -> None:
         nonlocal due, first
         now = time.monotonic()
         first = first or (now, done)  # earlier work, such as compiling, is not counted
@@ -175,7 +176,7 @@ def _log_lines(what: str, stream: TextIO) -> Progress:
         due = now + (now - begun)
         found = "" if best is None else f", best {best:.4f}"
         left = (now - first[0]) * (total - done) / (done - first[1])
-        print(f"{what}: {done:,} of {total:,}{found}, about {left:.0f} s left",
+        print(f"{what}: {int(done):,} of {total:,}{found}, about {left:.0f} s left",
               file=stream, flush=True)  # fmt: skip
 
     return write

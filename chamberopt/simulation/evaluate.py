@@ -46,12 +46,7 @@ from chamberopt.simulation.estimates import (
     told_of_each_step,
 )
 from chamberopt.simulation.evaluation import Evaluation
-from chamberopt.simulation.replicas import (
-    ReplicaSet,
-    ReplicaSetting,
-    run_in_order,
-    simulate_replica,
-)
+from chamberopt.simulation.replicas import ReplicaSet, ReplicaSetting, Underway, run_in_order
 from chamberopt.simulation.resting_balls import resting_notes
 from chamberopt.simulation.settling import first_half_excess, settling_notes
 from chamberopt.simulation.trapped_balls import trapped_notes, trapped_shares
@@ -145,6 +140,7 @@ class _Run:
         require_metrics(design, self.plan.objective_name)
         setting = ReplicaSetting(design, chamber, self.cavity or mesh)
         self.setting = share(self.executor, setting)
+        self.before, self.underway = len(self.known.replicas), Underway(setting, self.setting)
         self.effort = Effort.of(design.process.accuracy, self.plan.count)
         self.step = self.effort.begin  # how many replicas the next look takes
         self.timings = {"simulate": 0.0, "coverage": 0.0}
@@ -224,10 +220,15 @@ class _Run:
         count = self.step.replicas
         how = design.process.seed, self.executor, plan.stream, range(len(replicas), count), count
         began = time.perf_counter()
-        for replica in run_in_order(simulate_replica, self.setting, *how):
-            replicas.append(replica)
+
+        def tell() -> None:
             if progress:
-                progress(len(replicas), max(count, self.effort.most), None)
+                done = max(len(replicas), self.before + self.underway.done)
+                progress(done, max(count, self.effort.most), None)
+
+        for replica in run_in_order(self.underway.task, self.setting, *how, tell):
+            replicas.append(replica)
+            tell()
             self.look()
         simulated = time.perf_counter()
         hits, seen = self.look()

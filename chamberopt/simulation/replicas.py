@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, wait
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 S = TypeVar("S")
 T = TypeVar("T")
+LOOK_S = 0.5  # between looks at how far replicas have come
 
 
 class ReplicaSetting(NamedTuple):
@@ -67,6 +69,34 @@ class ReplicaSet:
     target: TargetField | None = None  # by `prepare_target`; None until it is called
 
 
+class Underway:
+    """How many replicas are simulated so far, with the simulated parts of those that run.
+
+    Parts are known of threads of this process; other workers tell of nothing but the end.
+
+    Args:
+        setting: the setting of the replicas.
+        shared: the same, as executor.share returns it: itself where threads take it.
+    """
+
+    def __init__(self, setting: ReplicaSetting, shared: ReplicaSetting) -> None:
+        self._is_here, self._steps = shared is setting, max(len(setting.chamber.steps), 1)
+        self._shares: dict[int, float] = {}  # of the time of a replica or of a step, by its seed
+
+    @property
+    def task(self) -> Callable[[ReplicaSetting, int], Replica]:
+        """What simulates a replica, and tells here how far it has come."""
+        return partial(simulate_replica, told=self.tell) if self._is_here else simulate_replica
+
+    def tell(self, seed: int, part: float) -> None:
+        """Take note of the part of its time that a replica, or a step of one, has behind it."""
+        self._shares[seed] = part
+
+    @property
+    def done(self) -> float:
+        return sum([*self._shares.values()]) / self._steps
+
+
 def simulate_replicas(
     setting: ReplicaSetting,
     executor: Executor,
@@ -82,10 +112,15 @@ def simulate_replicas(
     process, shared = setting.design.process, share(executor, setting)
     wanted = range(process.accuracy.replicas) if numbers is None else numbers
     how = process.seed, executor, "search", wanted, len(wanted)
-    for replica in run_in_order(simulate_replica, shared, *how):
-        found.append(replica)
+    underway = Underway(setting, shared)
+
+    def tell() -> None:
         if progress:
-            progress(wanted.start + len(found), wanted.stop, None)
+            progress(wanted.start + max(len(found), underway.done), wanted.stop, None)
+
+    for replica in run_in_order(underway.task, shared, *how, tell):
+        found.append(replica)
+        tell()
     return found
 
 
@@ -97,6 +132,7 @@ def run_in_order(
     stream: str,
     numbers: Sequence[int],
     ahead: int,
+    tell: Callable[[], None] | None = None,
 ) -> Iterator[T]:
     """Run a task for each replica on the workers, and yield the results in order.
 
@@ -110,6 +146,7 @@ def run_in_order(
         numbers: numbers of the replicas.
         ahead: number of tasks that are started before their results are wanted. It bounds the
             memory that waiting results take.
+        tell: called about every LOOK_S seconds while a result is waited for.
     """
     waiting: deque[tuple[int, Future[T]]] = deque()
     try:
@@ -118,34 +155,43 @@ def run_in_order(
                 (number, executor.submit(task, setting, replica_seed(seed, number, stream)))
             )
             if len(waiting) > ahead:
-                yield _result(*waiting.popleft())
+                yield _result(*waiting.popleft(), tell)
         while waiting:
-            yield _result(*waiting.popleft())
+            yield _result(*waiting.popleft(), tell)
     finally:
         # If a replica fails or the user presses Ctrl-C, the replicas that wait are not simulated.
         for _, future in waiting:
             future.cancel()
 
 
-def _result(number: int, future: Future[T]) -> T:
+def _result(number: int, future: Future[T], tell: Callable[[], None] | None) -> T:
+    while tell and not future.done():
+        wait([future], LOOK_S)
+        tell()
     try:
         return future.result()
     except WorkerLostError as error:
         raise WorkerLostError(f"replica {number}: {error}") from None
 
 
-def simulate_replica(setting: ReplicaSetting, seed: int) -> Replica:
+def simulate_replica(
+    setting: ReplicaSetting, seed: int, told: Callable[[int, float], None] | None = None
+) -> Replica:
     """Simulate one replica with this seed, and return its balls and its impacts on the part.
 
     With steps, each step is simulated from a start of its own, for its share of the time.
+
+    Args:
+        told: called as told(seed, part of the time that is simulated), now and then; with steps by
+            the seed of each.
     """
     design, chamber, _ = setting
     if not chamber.steps:
-        return replica_of(setting, simulate_seed(*setting, seed))
+        return replica_of(setting, simulate_seed(*setting, seed, told))
     own = zip(design.in_steps.values(), chamber.steps, strict=True)
     return join_steps(
         [
-            simulate_replica(ReplicaSetting(one, room, room.mesh), step_seed(seed, k))
+            simulate_replica(ReplicaSetting(one, room, room.mesh), step_seed(seed, k), told)
             for k, (one, room) in enumerate(own)
         ],
         chamber,
@@ -198,16 +244,29 @@ def times_on_part(chamber: Chamber, result: SimulationResult) -> np.ndarray:
 
 
 def simulate_seed(
-    design: Design, chamber: Chamber, mesh: TriangleMesh | AnalyticCavity, seed: int
+    design: Design,
+    chamber: Chamber,
+    mesh: TriangleMesh | AnalyticCavity,
+    seed: int,
+    told: Callable[[int, float], None] | None = None,
 ) -> SimulationResult:
     """Run the simulator once with this seed, and return its result.
 
     The impacts in the result are on triangles of the chamber.
+
+    Args:
+        told: as of `simulate_replica`.
     """
     from sim_core import TriangleMesh, simulate
 
     axis, flexure = turning_axis(design, chamber.part), flexure_of_surfaces(design, chamber, mesh)
-    result = simulate(build_scene(design, mesh, seed, axis, flexure))
+    scene = build_scene(design, mesh, seed, axis, flexure)
+
+    def tell(seconds: float) -> None:
+        if told:
+            told(seed, seconds / (scene.warmup + scene.duration))
+
+    result = simulate(scene, progress=tell)
     if isinstance(mesh, TriangleMesh):
         return result
     return replace(result, impacts=impacts_on_chamber(result.impacts, chamber))

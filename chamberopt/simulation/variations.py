@@ -34,7 +34,7 @@ class RunsProgress:
     runs: int
     ended: int = 0  # number of runs before the present run
 
-    def __call__(self, done: int, total: int, best: float | None) -> None:
+    def __call__(self, done: float, total: int, best: float | None) -> None:
         """Report the number of replicas done in the present run and all runs before it."""
         if self.progress:
             runs = max(self.runs, self.ended + 1)

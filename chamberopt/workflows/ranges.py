@@ -78,7 +78,7 @@ def study_ranges(result: StudyResult, executor: Executor, teller: Teller) -> Stu
         for one, unknown in zip(compared, groups, strict=True):
             chamber = build_chamber(one.design, result.target)
 
-            def tell(done: int, _: int, best: float | None, before: int = ended) -> None:
+            def tell(done: float, _: int, best: float | None, before: int = ended) -> None:
                 progress(before + done, total, best)
 
             ends.append(_simulated(one.design, chamber, one.evaluation, executor, tell, count))

@@ -51,7 +51,7 @@ from sim_core.scene.invariants import beneath_mean_plane, contained, narrowest_g
 from sim_core.scene.scene import TOUCH, Scene
 
 # s simulated between checks that every ball is still inside; one check costs about a ms
-CHECK_EVERY = 1.0
+CHECK_EVERY = 0.2
 
 
 @dataclass(frozen=True)
@@ -115,8 +115,8 @@ def simulate(
     Args:
         frames: ascending times [s since the end of the warm-up], (f,), at which the balls are
             noted, each on its flight at that very time. Noting changes no bit of the other results.
-        progress: called about every simulated second with the time since the start, including the
-            warm-up [s].
+        progress: called at least every CHECK_EVERY simulated seconds with the time since the start,
+            including the warm-up [s].
 
     Raises:
         SimulationError: if a ball is lost, jams, or stops being a number.

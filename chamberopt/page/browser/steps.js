@@ -33,13 +33,13 @@ export const sinceBegin = (seconds) => seconds < 120 ? `at work for ${seconds} s
 
 // A command in stages as a line of its stage and what is being done of it, and a bar.
 export const stage = ([first, ...inner]) => {
-  const last = inner.at(-1), now = last ? ` (${last.step}${!last.total && last.done ? `: ${last.done} so far` : ""})` : "";
+  const last = inner.at(-1), now = last ? ` (${last.step}${!last.total && last.done ? `: ${Math.floor(last.done)} so far` : ""})` : "";
   return [element("div", {}, `${first.step}${now}`, element("progress"))];
 };
 
 export const bars = (steps) => {
   for (const step of begun.keys()) if (!steps.some((one) => one.step === step)) begun.delete(step);
   return steps.map((one) => element("div", {},
-    `${one.step}${one.total ? `: ${one.done} of ${one.total}` : one.done ? `: ${one.done} so far` : ""}${one.best === null ? "" : `, best ${one.best.toFixed(4)}`}${left(one)}`,
+    `${one.step}${one.total ? `: ${Math.floor(one.done)} of ${one.total}` : one.done ? `: ${Math.floor(one.done)} so far` : ""}${one.best === null ? "" : `, best ${one.best.toFixed(4)}`}${left(one)}`,
     Object.assign(element("progress"), one.total ? { max: one.total, value: one.done } : {})));
 };

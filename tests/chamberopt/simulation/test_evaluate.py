@@ -25,7 +25,7 @@ from chamberopt.simulation.estimates import (
     weighted_sum,
 )
 from chamberopt.simulation.evaluate import MAX_SPEED, ReplicaPlan, evaluate, prepare_target
-from chamberopt.simulation.replicas import ReplicaSet
+from chamberopt.simulation.replicas import ReplicaSet, ReplicaSetting, Underway, simulate_replica
 from tests.helpers.synthetic import evaluation_of, plane_chamber, plate_design, random_dents
 
 DESIGN = plate_design(process__treatment_time_s=50.0)
@@ -166,7 +166,7 @@ def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
         process__accuracy__replicas=4,
     ).changed({"effects.friction": "none", "effects.roughness": "none"})  # fmt: skip
     chamber = build_chamber(design)
-    seen: list[tuple[int, int, float | None]] = []
+    seen: list[tuple[float, int, float | None]] = []
     serial = evaluate(design, chamber, SerialExecutor(), lambda *args: seen.append(args))
     with local_executor(3) as executor:
         threaded = evaluate(design, chamber, executor)
@@ -176,7 +176,8 @@ def test_evaluate_gives_the_same_numbers_on_any_number_of_workers() -> None:
     for one, other in zip(serial.hits, threaded.hits, strict=True):
         np.testing.assert_array_equal(one.place, other.place)
         np.testing.assert_array_equal(one.dent, other.dent)
-    assert seen == [(i, 4, None) for i in range(1, 5)]
+    assert seen == sorted(seen)
+    assert seen[-1] == (4, 4, None)
     impacts = sum(len(hits) for hits in serial.hits)
     assert impacts > 0
     assert serial.simulated_time == pytest.approx(0.08)
@@ -225,11 +226,11 @@ def accurate(coverage: float, most: int) -> Design:
 
 def test_replicas_are_added_until_the_accuracy_holds_or_the_budget_ends() -> None:
     chamber = build_chamber(accurate(0.2, 100))
-    told: list[tuple[int, int]] = []
+    told: list[tuple[float, int]] = []
     loose = evaluate(
         accurate(0.2, 100), chamber, SerialExecutor(), progress=lambda *now: told.append(now[:2])
     )
-    assert told[0] == (1, 100)
+    assert {total for _, total in told[:-1]} == {100}
     assert told[-1] == (loose.replicas, loose.replicas)
     assert loose.stopped_by == "accuracy"
     assert loose.objective.half_width <= 0.2
@@ -282,3 +283,22 @@ def test_an_objective_keeps_what_replicas_do_not_show() -> None:
     both = weighted_sum(OBJECTIVES["uniform_coverage"], metrics)
     assert both.half_width == pytest.approx(0.14)  # the replicas cancel out
     assert both.bias == pytest.approx(0.04)
+
+
+def test_a_replica_tells_how_far_it_has_come() -> None:
+    design = plate_design(
+        process__accuracy__simulated_time_s=0.8, process__accuracy__warmup_time_s=0.4
+    )
+    chamber = build_chamber(design)
+    setting = ReplicaSetting(design, chamber, chamber_mesh(chamber))
+    here, elsewhere = Underway(setting, setting), Underway(setting, setting._replace())
+    seen: list[float] = []
+    simulate_replica(setting, 1, lambda seed, part: seen.append(part))
+    assert seen == sorted(seen)
+    assert 6 <= len(seen) <= 8  # at least every 0.2 s
+    assert seen[-1] == pytest.approx(1.0)
+    here.task(setting, 1)
+    elsewhere.task(setting, 1)
+    assert (here.done, elsewhere.done) == (pytest.approx(1.0), 0.0)
+    here.tell(2, 0.25)
+    assert here.done == pytest.approx(1.25)
