@@ -13,7 +13,7 @@ from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.documents.coverage import change
 from chamberopt.documents.document import AnswerLine
 from chamberopt.documents.ranges import range_answer
-from chamberopt.documents.wanted import wanted_lines
+from chamberopt.documents.wanted import intensity_lines, time_lines
 from chamberopt.documents.wording import Label, metric_label, objective_label, plain
 from chamberopt.documents.zones import step_lines, zone_lines
 from chamberopt.results.load import load_result, load_start
@@ -98,10 +98,11 @@ def on_average(result: Result) -> str:
 def answer_lines(result: Result) -> list[AnswerLine]:
     """Return sentences that qualify the answer.
 
-    The sentences say whether the wanted intensity and coverage are there, what each step does,
-    which limits of zones and constraints are met, and name doubts about the calibration.
+    The sentences say whether the time is enough and the wanted intensity there, what each step
+    does, which limits of zones and constraints are met, and name doubts about the calibration.
     """
-    lines = [*range_answer(result), *wanted_lines(result.design, result.metrics)]
+    lines = [*time_lines(result), *range_answer(result)]
+    lines += intensity_lines(result.design, result.metrics)
     lines += [*step_lines(result), *zone_lines(result), *_constraint_lines(result)]
     calibration = result.design.calibration
     doubts = [*misfit_texts(calibration), calibration.not_mmA] if calibration else []

@@ -22,11 +22,11 @@ from chamberopt.design.tolerances import USUAL, USUAL_IN_WORDS, tolerance_box
 from chamberopt.documents.answer import answer, answer_lines
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
-from chamberopt.documents.ranges import groups_text, slow_end_is_late, time_at_slow_end
+from chamberopt.documents.ranges import time_at_slow_end
 from chamberopt.documents.report import limits_of_intervals, notes_of
 from chamberopt.documents.study import exposed_target
 from chamberopt.documents.tolerances import sheet_rows
-from chamberopt.documents.wanted import wanted_lines, wanted_rows
+from chamberopt.documents.wanted import intensity_lines, time_lines, wanted_rows
 from chamberopt.documents.wording import metric_label, plain, value_text
 from chamberopt.documents.zones import turned
 from chamberopt.results.load import load_start
@@ -82,8 +82,8 @@ def alarms(result: Result) -> Iterator[str]:
             "simulated time than in the second. Simulate with a longer "
             "process.accuracy.warmup_time_s before this is built."
         )
-    yield from _bare(result)
-    yield from (one.text for one in wanted_lines(result.design, result.metrics) if one.warns)
+    said = [*time_lines(result)[:1], *intensity_lines(result.design, result.metrics)]
+    yield from (one.text for one in said if one.warns)
 
 
 def _wide_face(result: Result, face_mm: tuple[float, ...]) -> Iterator[str]:
@@ -107,36 +107,12 @@ def _is_unresolved(figure: Estimate) -> bool:
     return figure.in_words == NOT_RESOLVED
 
 
-def _bare(result: Result) -> Iterator[str]:
-    """Yield a sentence if the peening time is too short to cover the target, else nothing."""
-    time, mean = result.metrics.get(TIME), result.metrics["mean_coverage"]
-    planned = result.design.process.treatment_time
-    if not mean.has_number or time is None:
-        return
-    if _is_unresolved(time):
-        if mean.high >= FULL:
-            return
-        needed = "when it is covered is not resolved"
-    elif time.in_words == "never":
-        needed = "95 % of its area is never 98 % covered, however long it is peened"
-    elif time.value > planned:
-        text = time.in_words or metric_label(TIME).format(time)
-        needed = f"95 % of its area is 98 % covered after {text}"
-    else:
-        return
-    bare = estimate_text(Estimate(1.0 - mean.value, mean.half_width), 100.0, "%")
-    yield (
-        f"The peening time is too short: {plain(planned)} s leave {bare} of the target bare; "
-        f"{needed}."
-    )
-
-
 def cautions(result: Result) -> Iterator[str]:
     """Yield warnings for the operator.
 
     The warnings say how the simulation differs from the machine, and which goals are not reached.
     """
-    yield from _slow_time(result)
+    yield from (one.text for one in time_lines(result)[1:])
     if result.design.effects.friction is None:
         yield (
             "Simulated without friction, as asked. With it the shot was 22 to 47 % slower in a "
@@ -156,23 +132,8 @@ def cautions(result: Result) -> Iterator[str]:
         )
 
 
-def _slow_time(result: Result) -> Iterator[str]:
-    """Yield a sentence if the time is enough as designed, but not at the slow end of ranges."""
-    found, time = result.record.ranges, result.metrics.get(TIME)
-    planned = result.design.process.treatment_time
-    if time is None or _is_unresolved(time) or time.value > planned:
-        return
-    if found and slow_end_is_late(result):
-        yield (
-            f"The peening time is enough as designed, but not at the slow end of what is not "
-            f"calibrated ({groups_text(found)}): there 95 % of the target's area is 98 % covered "
-            f"after: {time_at_slow_end(result)}."
-        )
-
-
 MOST_ROWS = 4  # sizes of shot, or further sonotrodes; the report has all of them
 MOST_KEYS = 8  # numbers of the chamber
-FULL = 0.98  # mean coverage from which on the target counts as covered
 DIGEST = 12  # characters of a digest in the title block
 REVISION = "revision"
 TO_FILL = ("drawing no.", REVISION, "drawn by, date", "checked by, date", "set up by, date")

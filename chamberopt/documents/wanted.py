@@ -1,21 +1,27 @@
-"""Text about the intensity and coverage that are wanted, beside those that were simulated."""
+"""Text about intensity, coverage and time that are wanted, beside those that were simulated."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
+from chamberopt.common.estimate import Estimate
+from chamberopt.common.number_text import estimate_text
 from chamberopt.design.intensity import OUTSIDE, Comparison
 from chamberopt.documents.document import AnswerLine
+from chamberopt.documents.ranges import groups_text, slow_end_is_late, time_at_slow_end
 from chamberopt.documents.wording import metric_label, plain
 
 if TYPE_CHECKING:
-    from chamberopt.common.estimate import Estimate
     from chamberopt.design.load import Design
     from chamberopt.results.load import Result
 
 TIME = "time_to_98_s"
 MET, NOT_MET, NOT_DECIDED = "met", "not met", "not decided"
+ENOUGH = {MET: "Enough", NOT_MET: "Not enough", NOT_DECIDED: "Not certain to be enough"}
+FULL = 0.98  # mean coverage from which on the target counts as covered
+NEVER = "95 % of its area is never 98 % covered, however long it is peened"
+UNKNOWN = "when it is covered is not resolved"
 
 
 def intensity_text(design: Design) -> str:
@@ -38,7 +44,7 @@ def time_text(design: Design, metrics: Mapping[str, Estimate]) -> str:
     An example is "2.1 × the time to 98 % on 95 % of the target's area, 143 ± 5 s".
     """
     time, planned = metrics.get(TIME), design.process.treatment_time
-    if time is None or time.in_words or not 0.0 < time.low < time.high < float("inf"):
+    if time is None or time.in_words or not time.value > 0.0:
         return ""
     multiple, after = plain(planned / time.value, 2), metric_label(TIME).format(time)
     return f"{multiple} × the time to 98 % on 95 % of the target's area, {after}"
@@ -46,33 +52,75 @@ def time_text(design: Design, metrics: Mapping[str, Estimate]) -> str:
 
 def coverage_standing(design: Design, metrics: Mapping[str, Estimate]) -> str:
     """Return whether the peening time is enough for the wanted coverage, by its whole interval."""
-    time, percent = metrics.get(TIME), design.process.coverage_percent
-    if percent is None or time is None or not time.has_number:
+    time = metrics.get(TIME)
+    if time is None or not time.has_number:
         return NOT_MET if time is not None and time.in_words == "never" else NOT_DECIDED
-    planned, times = design.process.treatment_time, percent / 100.0
+    return time_standing(design, time)
+
+
+def time_standing(design: Design, time: Estimate) -> str:
+    """Return whether the peening time is enough, for 98 % or for the wanted coverage.
+
+    Args:
+        time: the time to 98 % [s], with its whole interval.
+    """
+    planned, times = design.process.treatment_time, _times(design)
     if planned >= times * time.high:
         return MET
     return NOT_MET if planned < times * time.low else NOT_DECIDED
 
 
-def wanted_lines(design: Design, metrics: Mapping[str, Estimate]) -> list[AnswerLine]:
-    """Return a sentence on the wanted intensity, and one on the wanted coverage, if there are any.
+def _times(design: Design) -> float:
+    """Return the wanted coverage as a multiple of the time to 98 %; 1 if none is asked for."""
+    percent = design.process.coverage_percent
+    return 1.0 if percent is None else percent / 100.0
 
-    A sentence warns if the intensity is outside of its range, or the time too short.
+
+def time_lines(result: Result) -> list[AnswerLine]:
+    """Return whether the peening time is enough, for 98 % or for the coverage that is wanted.
+
+    A second sentence warns if it is not enough at the slow end of what is not calibrated. There is
+    none of them if too little is known of the coverage.
     """
-    lines = []
+    design, metrics = result.design, result.metrics
+    time, mean = metrics.get(TIME), metrics.get("mean_coverage")
+    if time is None or mean is None or not mean.has_number:
+        return []
+    planned = design.process.treatment_time
+    bare = estimate_text(Estimate(1.0 - mean.value, mean.half_width), 100.0, "%")
+    leaves = f"{plain(planned)} s leave {bare} of the target bare"
+    if time.in_words:
+        why = {"never": NEVER}.get(time.in_words, UNKNOWN)
+        is_known = time.in_words == "never" or mean.high < FULL
+        return [_of_process(f"Not enough: {leaves}; {why}.", True)] if is_known else []
+    standing, asked = time_standing(design, time), coverage_text(design)
+    text = f"{plain(planned)} s are {time_text(design, metrics)}"
+    if standing == NOT_MET and mean.high < FULL:
+        text = f"{leaves}; they are {time_text(design, metrics)}"
+    text += f"; wanted are {asked}" if asked else ""
+    is_short = time.value * _times(design) > planned
+    lines = [_of_process(f"{ENOUGH[standing]}: {text}.", is_short)]
+    if time.value <= planned and result.record.ranges and slow_end_is_late(result):
+        slow = (
+            "The peening time is enough as designed, but not at the slow end of what is not "
+            f"calibrated ({groups_text(result.record.ranges)}): there 95 % of the target's area is "
+            f"98 % covered after: {time_at_slow_end(result)}."
+        )
+        lines.append(_of_process(slow, True))
+    return lines
+
+
+def _of_process(text: str, warns: bool) -> AnswerLine:
+    return AnswerLine("process", text, warns)
+
+
+def intensity_lines(design: Design, metrics: Mapping[str, Estimate]) -> Iterator[AnswerLine]:
+    """Yield a sentence on the wanted intensity, if there is one. It warns if it is outside."""
     if design.process.intensity_mmA is not None:
         found = Comparison.of(design.process.intensity_mmA, metrics, design.calibration)
         wanted = f"Almen intensity wanted {intensity_text(design)}: {found.in_words}"
         text = f"{wanted}; predicted {found.predicted}."
-        lines.append(AnswerLine("process", text, warns=found.standing == OUTSIDE))
-    if wanted := coverage_text(design):
-        standing = coverage_standing(design, metrics)
-        known = time_text(design, metrics) or "a multiple that is not known of the time to 98 %"
-        planned = plain(design.process.treatment_time)
-        text = f"Coverage wanted {wanted}: {standing}; the peening time of {planned} s is {known}."
-        lines.append(AnswerLine("process", text, warns=standing == NOT_MET))
-    return lines
+        yield _of_process(text, found.standing == OUTSIDE)
 
 
 def wanted_rows(result: Result) -> Iterator[tuple[str, str]]:

@@ -126,7 +126,11 @@ def plain(value: float | str, digits: int = 4) -> str:
 
 
 def value_text(value: object, digits: int = 4) -> str:
-    """Return a value of a file as text: yes or no, numbers and words, joined by commas."""
+    """Return a value of a file as text: yes or no, numbers and words, joined by commas.
+
+    >>> value_text([True, 20.5, ["all"]])
+    'yes, 20.5, (all)'
+    """
     if value is None:
         return "–"
     if isinstance(value, bool):
@@ -134,7 +138,10 @@ def value_text(value: object, digits: int = 4) -> str:
     if isinstance(value, float):
         return plain(value, digits)
     if isinstance(value, list | tuple):
-        return ", ".join(value_text(one, digits) for one in value)
+        texts = [(one, value_text(one, digits)) for one in value]
+        return ", ".join(
+            f"({text})" if isinstance(one, list | tuple) else text for one, text in texts
+        )
     return json.dumps(value, ensure_ascii=False) if isinstance(value, dict) else str(value)
 
 

@@ -7,9 +7,16 @@ from typing import Any
 import pytest
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.documents.wanted import coverage_standing, time_text, wanted_lines, wanted_rows
+from chamberopt.documents.wanted import (
+    coverage_standing,
+    intensity_lines,
+    time_lines,
+    time_text,
+    wanted_rows,
+)
 
 TIME = Estimate(100.0, 10.0)
+HALF, FULL = Estimate(0.5, 0.03), Estimate(0.99, 0.005)  # mean coverage
 
 
 def a_design(
@@ -18,6 +25,13 @@ def a_design(
     """A design of an uncalibrated machine, as far as these texts read it."""
     process = SimpleNamespace(treatment_time=time, coverage_percent=percent, intensity_mmA=wanted)
     return SimpleNamespace(process=process, calibration=None)
+
+
+def a_result(design: Any, time: Estimate, mean: Estimate = FULL) -> Any:
+    """A result without ranges, as far as these texts read it."""
+    metrics = {"time_to_98_s": time, "mean_coverage": mean}
+    record = SimpleNamespace(ranges=None)
+    return SimpleNamespace(design=design, metrics=metrics, record=record)
 
 
 @pytest.mark.parametrize(
@@ -37,26 +51,47 @@ def test_coverage_is_a_multiple_of_the_time_to_98(
 ) -> None:
     design = a_design(time, percent)
     assert coverage_standing(design, {"time_to_98_s": TIME}) == standing
-    (line,) = wanted_lines(design, {"time_to_98_s": TIME})
-    assert line.warns == (standing == "not met")
-    assert f"{percent:g} %: {percent / 100:g} × the time to 98 %: {standing}" in line.text
+    (line,) = time_lines(a_result(design, TIME))
+    assert line.warns == (100.0 * percent / 100.0 > time)
+    words = {"met": "Enough", "not met": "Not enough", "not decided": "Not certain to be enough"}
+    assert line.text.startswith(f"{words[standing]}: {time:g} s are ")
+    assert line.text.endswith(f"; wanted are {percent:g} %: {percent / 100:g} × the time to 98 %.")
     assert f"{time / 100.0:.2g} × the time to 98 % on 95 % of the" in line.text
     assert "area, 100 ± 10 s" in line.text
 
 
 @pytest.mark.parametrize(
-    ("time", "standing"),
+    ("time", "standing", "why"),
     [
-        (Estimate(100.0, math.inf, in_words="not resolved"), "not decided"),
-        (Estimate(1e6, 0.0, in_words="never"), "not met"),
+        (Estimate(100.0, math.inf, in_words="not resolved"), "not decided", "is not resolved."),
+        (Estimate(1e6, 0.0, in_words="never"), "not met", "however long it is peened."),
     ],
 )
-def test_a_time_without_a_number_gives_no_multiple(time: Estimate, standing: str) -> None:
+def test_a_time_without_a_number_gives_no_multiple(time: Estimate, standing: str, why: str) -> None:
     design, metrics = a_design(300.0, 200.0), {"time_to_98_s": time}
     assert time_text(design, metrics) == ""
     assert coverage_standing(design, metrics) == standing
-    (line,) = wanted_lines(design, metrics)
-    assert "a multiple that is not known" in line.text
+    (line,) = time_lines(a_result(design, time, HALF))
+    assert line.warns
+    assert line.text.startswith("Not enough: 300 s leave 50 ± 3 % of the target bare; ")
+    assert line.text.endswith(why)
+
+
+def test_a_target_that_is_covered_needs_no_time_that_is_resolved() -> None:
+    time = Estimate(100.0, math.inf, in_words="not resolved")
+    assert time_lines(a_result(a_design(300.0), time)) == []
+    unknown = Estimate(0.5, math.inf, in_words="not resolved")
+    assert time_lines(a_result(a_design(300.0), TIME, unknown)) == []
+
+
+def test_without_a_wanted_coverage_98_per_cent_are_enough() -> None:
+    (line,) = time_lines(a_result(a_design(50.0), TIME, HALF))
+    assert line.warns
+    assert line.text.startswith(
+        "Not enough: 50 s leave 50 ± 3 % of the target bare; they are 0.5 ×"
+    )
+    (line,) = time_lines(a_result(a_design(120.0), TIME))
+    assert (line.warns, line.text[:22]) == (False, "Enough: 120 s are 1.2 ")
 
 
 def test_the_sheet_has_the_band_beside_the_predicted_intensity() -> None:
@@ -69,11 +104,11 @@ def test_the_sheet_has_the_band_beside_the_predicted_intensity() -> None:
     assert rows["intensity predicted"].startswith("0.18 mmA, x/÷ 2.5")
     bare: Any = SimpleNamespace(design=a_design(250.0), metrics=metrics)
     assert [*dict(wanted_rows(bare))] == ["that is"]
-    assert wanted_lines(bare.design, metrics) == []
+    assert [*intensity_lines(bare.design, metrics)] == []
 
 
 def test_an_intensity_that_is_certainly_outside_is_a_warning() -> None:
     far = {"strength_um": Estimate(1.1, 0.05)}
-    (line,) = wanted_lines(a_design(250.0, wanted=(0.15, 0.2)), far)
+    (line,) = intensity_lines(a_design(250.0, wanted=(0.15, 0.2)), far)
     assert line.warns
     assert "0.15 to 0.2 mmA: outside with the whole interval; predicted 0.015 mmA" in line.text
