@@ -39,7 +39,7 @@ from chamberopt.pictures.charts.study import (
 )
 from chamberopt.search.optimiser.search_model import POINTS_PER_PARAMETER
 from chamberopt.search.sensitivity import Slice
-from chamberopt.search.study.schema import Objective
+from chamberopt.search.study.schema import Objective, Optimizer
 from chamberopt.search.study_folder import STUDY
 
 if TYPE_CHECKING:
@@ -88,13 +88,14 @@ def question_section(result: Result) -> Section:
 
 
 def aim_in_words(tables: Mapping[str, Any]) -> str:
-    """Return what a study is after and what it varies, from the tables of its file."""
+    """Return what a study is after, what it varies and how many chambers it tries, by its file."""
     objective = tables.get("objective", {})
     names = objective.get("pareto") or [objective.get("name", Objective().name)]
     aims = [AIMS[one] for one in names if one in AIMS]
     aim = " and ".join(aims) if aims and "sum" not in objective else "a weighted sum"
     varied = ", ".join(map(inner_first, tables.get("vary", {})))
-    return f"{aim}; varies {varied}"
+    count = tables.get("optimizer", {}).get("evaluations", Optimizer().evaluations)
+    return f"{aim}; varies {varied}; tries {count} chambers"
 
 
 def exposed_target(result: Result) -> str:

@@ -57,25 +57,31 @@ export const follow = async (started) => (await followed(show, started))?.exit ?
 function show({ command, result, steps, seconds, lines, exit }) {
   if (exit !== null && command.startsWith("chamberopt new ")) return; // of the front page
   const before = study;
-  study = exit === null && command.startsWith("chamberopt run ") ? result : "";
-  if (study && study !== before) document.dispatchEvent(new CustomEvent("running", { detail: study }));
+  study = exit === null && isStudy(command) ? result : "";
+  if (study && study !== before) showStudy(study);
   find("stop").disabled = exit !== null;
   isRunning = exit === null;
   allow();
   const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
-  find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...toResult(exit === 0 ? result : ""));
+  find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...toResult(command, result, exit));
   find("printed").textContent = lines.join("\n");
   find("printed-fold").hidden = !lines.length;
   if (exit) find("printed-fold").open = true;
 }
 
 // A page that was loaded anew meanwhile has not shown what the command has found.
-function toResult(result) {
-  if (!result) return [];
-  const button = element("button", { type: "button", textContent: "Show the result", title: result });
-  button.addEventListener("click", () => showResult(result));
-  return [button];
+function toResult(command, result, exit) {
+  if (!result || exit === null) return [];
+  const button = (textContent, act) => {
+    const made = element("button", { type: "button", textContent, title: result });
+    made.addEventListener("click", act);
+    return made;
+  };
+  return [...(exit === 0 ? [button("Show the result", () => showResult(result)), " "] : []),
+    ...(isStudy(command) ? [button("See its candidates", () => showStudy(result))] : [])];
 }
+const isStudy = (command) => command.startsWith("chamberopt run ");
+const showStudy = (folder) => document.dispatchEvent(new CustomEvent("study", { detail: folder }));
 
 for (const button of document.querySelectorAll("[data-command]")) button.addEventListener("click", () => attempt(async () => {
   if (isUnsaved()) throw new Error("there are unsaved changes: commands use the saved file, so save or undo them first");

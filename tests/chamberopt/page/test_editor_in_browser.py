@@ -301,7 +301,11 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     expect(page.locator("#message")).to_contain_text("written: stopped.toml")
     page.click("#stop")
     expect(page.locator("#progress")).to_contain_text("stopped", timeout=WAIT)
-    words = "98 % everywhere in the shortest time; varies mass of the shot"
+    page.click("#close-study")
+    page.locator("#progress").get_by_text("See its candidates").click()
+    expect(page.locator("#study-view")).to_be_visible(timeout=WAIT)
+    page.click("#close-study")
+    words = "98 % everywhere in the shortest time; varies mass of the shot; tries 2 chambers"
     expect(page.locator("#of-words")).to_have_text(words)
     opened.tab("run")
     page.select_option("#of", "design.toml")

@@ -208,4 +208,4 @@ find("study-more").addEventListener("click", () => attempt(async () => {
   goOn(await ask("/more", { folder, evaluations: Number(find("more-evaluations").value) }));
 }));
 const goOn = (started) => { look(); return followToEnd(started); };
-document.addEventListener("running", ({ detail }) => { if (detail !== folder) followStudy(detail); });
+document.addEventListener("study", ({ detail }) => { if (detail !== folder) followStudy(detail); });
