@@ -54,6 +54,7 @@ from sim_core.loop.compile_ahead import compile_simulator, is_compiled
 from sim_core.loop.impact_log import CollisionLog, ImpactLog
 from sim_core.loop.simulate import Collisions, SimulationResult, simulate
 from sim_core.loop.stays import Trapped
+from sim_core.numerics.computed_once import computed_once
 from sim_core.numerics.jit import jit, user_cache
 from sim_core.scene.bent_faces import require_profiles
 from sim_core.scene.frames import Energies, Frames, energies
@@ -96,6 +97,7 @@ __all__ = [
     "can_rest",
     "closest_points",
     "compile_simulator",
+    "computed_once",
     "cylinder_cavity",
     "drag_coefficient",
     "energies",

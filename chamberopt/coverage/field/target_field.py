@@ -32,6 +32,7 @@ from chamberopt.coverage.field.smooth_faces import Creases, Faces, find_faces
 from chamberopt.coverage.field.surface_points import Reach, ball_fits, reach_from, spread_points
 from chamberopt.coverage.field.symmetry import TOLERANCE, Symmetry, find_symmetry
 from chamberopt.geometry.triangles import areas, unit_normals
+from sim_core import computed_once
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from chamberopt.coverage.field.window_areas import SurfacePieces
     from chamberopt.coverage.field.windows import Windows
     from chamberopt.coverage.part_impacts import Hits
+    from sim_core import TriangleMesh
 
 OF_WIDE = 0.125  # number of windows of twice the radius, which overlap more, over all windows
 # Area of all windows together [m²], or over the target's area, whichever is more. A few windows
@@ -303,8 +305,6 @@ def find_target_field(chamber: Chamber, mesh: Rooms, setting: WindowSetting) -> 
     Args:
         mesh: surface of the chamber, or the rooms of all steps.
     """
-    from chamberopt.coverage.field.window_areas import surface_pieces
-
     part, gauge = chamber.part, setting.gauge
     area = np.where(part.target, part.area, 0.0)
     faces, creases = find_faces(part.vertices, part.triangles, part.target)
@@ -315,8 +315,11 @@ def find_target_field(chamber: Chamber, mesh: Rooms, setting: WindowSetting) -> 
     one_room = None if isinstance(mesh, tuple) or not setting.symmetric else mesh
     symmetry = None if one_room is None else find_symmetry(chamber, one_room)
     longest = _longest_side(setting, float(area.sum()), MAX_PIECES)
-    wanted = _near_windows(symmetry, part.target, corners, radius)
-    surface = surface_pieces(part.corners_with_normals[wanted], face[wanted], mesh, ball, longest)
+    if symmetry is None and not isinstance(mesh, tuple):
+        surface = _whole_surface(chamber, mesh, ball, longest)
+    else:
+        wanted = _near_windows(symmetry, part.target, corners, radius)
+        surface = _pieces(chamber, wanted, face, mesh, ball, longest)
     return TargetField(
         setting=setting,
         faces=faces,
@@ -333,11 +336,35 @@ def find_target_field(chamber: Chamber, mesh: Rooms, setting: WindowSetting) -> 
     )
 
 
+@computed_once(4)
+def _whole_surface(
+    chamber: Chamber, mesh: TriangleMesh, ball: float, longest: float
+) -> SurfacePieces:
+    """Return the pieces of a target: the same for windows of all sizes that are larger than a ball.
+
+    Args:
+        ball: radius of the smallest ball [m].
+        longest: longest side of a piece [m].
+    """
+    part = chamber.part
+    faces, _ = find_faces(part.vertices, part.triangles, part.target)
+    return _pieces(chamber, part.target, faces.of_triangle, mesh, ball, longest)
+
+
+def _pieces(
+    chamber: Chamber, wanted: np.ndarray, face: np.ndarray, mesh: Rooms, ball: float, longest: float
+) -> SurfacePieces:
+    from chamberopt.coverage.field.window_areas import surface_pieces
+
+    corners = chamber.part.corners_with_normals[wanted]
+    return surface_pieces(corners, face[wanted], mesh, ball, longest)
+
+
 def with_whole_part(field: TargetField, chamber: Chamber, mesh: Rooms) -> TargetField:
     """Return the field extended from the target to the rest of the part in the chamber, for
     pictures.
     """
-    from chamberopt.coverage.field.window_areas import joined_pieces, surface_pieces
+    from chamberopt.coverage.field.window_areas import joined_pieces
 
     rest = ~chamber.part.target & (chamber.exposed_area > 0.0)
     if not rest.any():
@@ -345,8 +372,7 @@ def with_whole_part(field: TargetField, chamber: Chamber, mesh: Rooms) -> Target
     area = float(chamber.part.area[rest].sum())
     wanted = _near_windows(field.symmetry, rest, field.corners, field.radius)
     longest = _longest_side(field.setting, area, MAX_PIECES_OFF_TARGET)
-    corners, ball = chamber.part.corners_with_normals[wanted], 0.5 * field.setting.ball
-    pieces = surface_pieces(corners, field.face[wanted], mesh, ball, longest)
+    pieces = _pieces(chamber, wanted, field.face, mesh, 0.5 * field.setting.ball, longest)
     return replace(
         field,
         has_windows=np.ones(len(rest), dtype=bool),
