@@ -219,6 +219,7 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
                 f"{'flange ' * (kind == 'arbor' and key != 'grip_mm')}{in_words(key)} {value:g} mm"
                 for one in own.values()
                 for key, value in _numbers(one)
+                if kind != "bore"  # its clearance is among the reasons: a seal, no clamp
             )
             keys = tuple(f"{one}.{key}" for one, values in own.items() for key in values)
             value = ", ".join(filter(None, (KINDS.get(kind, str(kind)), sizes)))

@@ -112,7 +112,7 @@ BETWEEN = "a plate that fits between the faces of the part, like the two walls b
 CUT_OUT = "plates, cut out round it"
 OWN_WALL, OWN_LID = "the part itself is the wall", f"the part itself is the lid: {CUT_OUT}"
 START = "NOT MEASURED by a pilot, a start"
-ON_END = "on end, as no sonotrode is large enough for it lying"
+ON_END = "on end, as no single sonotrode is large enough for it lying"
 
 
 def propose(
@@ -551,5 +551,5 @@ def _floor_reasons(floor: Floor, is_local: bool, goes_out: bool) -> dict[str, st
         "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point",
         **({"sonotrode.frequency_khz": one.note} if one.note else {}),
         **({"part.offset_mm": placed} if any(floor.offset_mm) else {}),
-        f"sonotrode.{key}": f"{kind}; one that the sonotrode can set",
+        f"sonotrode.{key}": f"{kind}; one to which the sonotrode can be set",
     }

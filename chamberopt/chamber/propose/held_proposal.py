@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from chamberopt.chamber.propose.proposal import (
     Tables,
     checked,
     faults,
-    new_warning,
+    new_harm,
     touched_share,
 )
 from chamberopt.chamber.propose.proposed_arbor import Bore
@@ -41,7 +42,8 @@ MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
 SEEN_OUT = 1e-3  # m by which a part stands out of a side
 MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area over the largest
 MOST_HOLDERS = 6  # that are tried
-HIDDEN = 0.005  # share of the target that a holder may keep from the balls
+# Share of the target that a holder may keep from the balls; where no other holds the part.
+HIDDEN, MOST_HIDDEN = 0.005, 0.03
 LEAST_LEFT, MOST_LEFT = 0.005, 0.15  # share of the target that is left out if no ball touches it
 NO_PLACE = (
     "no flat face beside the target looks up or aside and has room for a holder",
@@ -71,15 +73,16 @@ def held(
         one = end_holder(free.mesh, target.triangles, turns, diameter, end.triangles)
         choices = choices if one is None else [one._replace(keys={**one.keys, "at": end.at})]
     why = "" if choices else NO_PLACE[bool(target.triangles.all())]
-    for number, one in enumerate(choices):
-        progress(number, len(choices), None)
+    tried = [*product((HIDDEN, MOST_HIDDEN), choices)]
+    for number, (hidden, one) in enumerate(tried):
+        progress(number, len(tried), None)
         tables = _with_table(free.tables, "sonotrode", "holder", one.keys)
         height = "sonotrode to ceiling; what holds the part goes on to the wall"
         reasons = {**free.reasons, "holder.kind": one.reason, "chamber.height_mm": height}
         if one.pins:
             tables = _with_mask(tables, {"plugs": True, "at": {"faces": list(one.pins)}})
             reasons["mask.plugs"] = "the pins that hold it fill these holes, flush with their rims"
-        made, harm = _harmless(tables, reasons, floor, free, shop, one.keys["kind"])
+        made, harm = _harmless(tables, reasons, floor, free, shop, one.keys["kind"], hidden)
         if made is not None:
             return made
         why = why or harm
@@ -93,7 +96,7 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     tables = _with_table(made.tables, "sonotrode", "holder", keys)
     text = (
         f"clamped where it stands out of the chamber {_outside_in_words(made)}; the wall, cut out "
-        "round it, is split there"
+        f"{keys['clearance_mm']:g} mm round it so that no ball passes, is split there"
     )
     reasons = {**made.reasons, "holder.kind": text}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
@@ -237,6 +240,7 @@ def _harmless(
     before: Proposal,
     shop: Shop | None,
     kind: str = "mask",
+    hidden: float = HIDDEN,
 ) -> tuple[Proposal | None, str]:
     """Return a proposal with these tables in the place of one's own, or None and the harm they do.
 
@@ -245,6 +249,7 @@ def _harmless(
 
     Args:
         kind: what the tables add, for the words.
+        hidden: share of the target that they may keep from the balls.
     """
     try:
         made = checked(tables, reasons, floor, before.known, before.mesh, shop)
@@ -253,10 +258,10 @@ def _harmless(
         raise
     except InputError as error:
         return None, str(error)
-    if touched_share(before) - touched_share(made) > HIDDEN:
+    if touched_share(before) - touched_share(made) > hidden:
         return None, "a holder would keep the balls from some of the target"
-    if faults(made) > faults(before):
-        return None, f"the {kind} would bring a warning: {new_warning(made, before)}"
+    if harm := new_harm(made, before):
+        return None, f"with the {kind}: {harm}"
     return made, ""
 
 

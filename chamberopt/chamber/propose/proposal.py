@@ -169,16 +169,6 @@ def faults(made: Proposal) -> tuple[int, int]:
     return len(made.jams), len(made.warnings)
 
 
-def new_warning(made: Proposal, before: Proposal) -> str:
-    """Return the first warning of a proposal that another one has not, or else its first.
-
-    Where only gaps in which balls jam are new, it says so.
-    """
-    known = {text.partition(":")[0] for text in before.warnings}  # places and areas may differ
-    new = [text for text in made.warnings if text.partition(":")[0] not in known]
-    return next(iter(new or made.warnings), "balls jam in a gap")
-
-
 def new_harm(made: Proposal, before: Proposal) -> str:
     """Return in words the harm that a proposal does and another one does not; empty if none.
 

@@ -175,7 +175,8 @@ def larger_balls(
     if off >= 0.0:
         return None
     stock = (wanted.shop or usual_shop()).stock_mm(made.tables["shot"]["material"])
-    larger = [one for one in stock if now.ball_mm < one <= 1e3 * LARGEST_BALL]
+    most = 1e3 * min(LARGEST_BALL, OF_THIN * thinnest(made.chamber.part))
+    larger = [one for one in stock if now.ball_mm < one <= most]
     needed = now.ball_mm * math.exp(-off / BALL_POWER)
     ball = next((one for one in larger if one >= needed), larger[-1] if larger else None)
     if ball is None:
@@ -214,7 +215,7 @@ def beside_larger(
     )
     text = (
         f"WITH LARGER BALLS, {then.in_words}: {there}, beside {here} with {now.in_words} "
-        f"(--ball-mm {then.ball_mm:g} takes them), and not one after the other: {why}"
+        f"(--ball-mm {then.ball_mm:g} takes them); both, one after the other, do not pay: {why}"
     )
     reasons = {**made.reasons, INTENSITY: f"{made.reasons[INTENSITY]}; {text}"}
     return replace(made, reasons=reasons)
@@ -331,10 +332,10 @@ def _told(
     key = amplitudes_of(made.sonotrode)[0]
     off, more = wanted.off(predicted.value), others
     if off:
-        more = f"; NO BALLS AND AMPLITUDE GIVE THIS INTENSITY: {_needed(made, off)}"
+        more = f"; NO BALLS THAT SERVE THE TARGET GIVE THIS INTENSITY: {_needed(made, off)}"
     reasons = dict(made.reasons)
-    reasons[f"sonotrode.{key}"] += ", chosen for the intensity"
-    ball = "chosen for the intensity"
+    ball = "the nearest to the intensity" if off else "chosen for the intensity"
+    reasons[f"sonotrode.{key}"] += f", {ball}"
     if made.reasons["shot.diameter_mm"] == by_geometry:
         ball = f"{by_geometry}; {ball}"
     else:

@@ -177,8 +177,10 @@ def with_finer_balls(
         shares = f"{coarse_mm:g} mm serve {most.served:.0%}, {finer_mm:g} mm {fine.served:.0%}"
         for_fillets = fine.fillets > most.fillets + MISSED_FILLETS
         gain = fine.served - most.served
-        if not (gain > AS_GOOD or for_fillets) or most.served < MOSTLY:
-            return None, shares
+        if most.served < MOSTLY:
+            return None, f"the larger ones serve too little ({shares})"
+        if not (gain > AS_GOOD or for_fillets):
+            return None, f"the smaller ones serve hardly more ({shares})"
         for balls in RAISED:  # a ceiling that suits the coarse balls may hold the finer ones
             if "gap" in (harm := new_harm(finer, coarse)):
                 coarse = _raised(coarse, balls * finer_mm)

@@ -22,7 +22,7 @@ from chamberopt.chamber.propose.held_proposal import rests
 from chamberopt.chamber.propose.pose import AT_SIDE, Pose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, new_harm, with_charge
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS
-from chamberopt.chamber.propose.proposed_budget import Measured, TooSlowError
+from chamberopt.chamber.propose.proposed_budget import LONG, Measured, TooSlowError
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.triangles import rotation_matrix
@@ -30,7 +30,8 @@ from chamberopt.geometry.triangles import rotation_matrix
 SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways are tried
 # Time of all sonotrodes over that of the way before, below which a way is taken. Pilots know a time
 # to 10 to 20 %. A way is no weaker than this share of the intensity before.
-QUICKER, AS_STRONG = 0.8, 0.8
+QUICKER, AS_STRONG, HALF = 0.8, 0.8, 0.5
+SEVERAL = 3  # sonotrodes side by side that a shop would still mount, to be spared a LONG time
 LAYER = 2.0  # over half a layer
 SAME = 0.999  # cosine between the directions that point up, from which on a pose is no other one
 
@@ -129,13 +130,20 @@ def _harm(made: Proposal, first: Proposal) -> str:
 def _is_quicker(one: Way, other: Way) -> bool:
     """Return whether a way is worth taking instead of another one.
 
-    A way on twice as many sonotrodes, which have to vibrate alike, has to take half of the time.
+    A way on twice as many sonotrodes, which have to vibrate alike, has to take half of the time. Up
+    to SEVERAL do if it takes half of a time that nobody would run.
     """
     if one.found is None or other.found is None or one.found.places < other.found.places:
         return False
     now, then = one.found.intensity, other.found.intensity
     if now is not None and then is not None and now.value < AS_STRONG * then.value:
         return False
+    if (
+        other.found.time_to_98 > LONG
+        and _sonotrodes(one.made) <= SEVERAL
+        and one.found.time_to_98 < HALF * other.found.time_to_98
+    ):
+        return True
     ratio = max(_sonotrodes(one.made) / _sonotrodes(other.made), 1.0)
     return ratio * one.found.time_to_98 < QUICKER * other.found.time_to_98
 

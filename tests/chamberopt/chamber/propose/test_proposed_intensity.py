@@ -166,9 +166,9 @@ def test_machines_of_other_laws_are_found_by_pilots(
     reach = [law.level * x.ball_mm**law.p * x.amplitude_um**law.q for x in possible]
     if any(not intensity.off(x) for x in reach):
         assert not intensity.off(value)
-        assert "NO BALLS AND AMPLITUDE" not in made.reasons["process.intensity_mmA"]
+        assert "NO BALLS THAT SERVE" not in made.reasons["process.intensity_mmA"]
     else:
-        assert "NO BALLS AND AMPLITUDE" in made.reasons["process.intensity_mmA"]
+        assert "NO BALLS THAT SERVE" in made.reasons["process.intensity_mmA"]
     assert made.design.process.intensity_mmA == (intensity.low, intensity.high)
 
 
@@ -268,7 +268,7 @@ def test_settings_that_are_not_resolved_are_given_up(plate: Path, shop: Shop) ->
     made = propose_intensity(bare, wanted, far, lambda _: bare, simulate)
     assert setting_of(made) == runs[0]
     assert len(runs) == len(set(runs)) <= MOST_PILOTS
-    assert "NO BALLS AND AMPLITUDE" in made.reasons["process.intensity_mmA"]
+    assert "NO BALLS THAT SERVE" in made.reasons["process.intensity_mmA"]
 
 
 def test_a_shot_that_dents_no_strip_is_refused(plate: Path, shop: Shop) -> None:
@@ -410,7 +410,7 @@ def test_where_balls_are_too_weak_the_next_larger_ones_are_told_beside_them(
     text = told.reasons[INTENSITY]
     assert "WITH LARGER BALLS, 2 mm at 40 µm: about 0.12 mmA, " in text
     assert "of the target served, 98 % after about 100 s, beside about 0.05 mmA, " in text
-    assert text.endswith(", and not one after the other: they jam")
+    assert text.endswith("; both, one after the other, do not pay: they jam")
     for enough in (pilot_of(0.12, 600.0), pilot_of(0.2, 600.0), None):
         assert larger_balls(made, wanted, asked, enough, again, measure) is None
     fixed = replace(wanted, ball_mm=1.0)

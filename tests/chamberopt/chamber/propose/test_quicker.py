@@ -18,7 +18,7 @@ from chamberopt.chamber.propose.pose import Pose, end_to_wall, pose_by_size
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, with_charge
 from chamberopt.chamber.propose.proposed_budget import Measured, TooSlowError
 from chamberopt.chamber.propose.proposed_steps import propose_second_pose, turned_over
-from chamberopt.chamber.propose.quicker import Way, propose_quicker
+from chamberopt.chamber.propose.quicker import SEVERAL, Way, propose_quicker
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.load import load_design
@@ -170,6 +170,19 @@ def test_more_sonotrodes_must_save_more_time(poses: dict[Pose | None, Proposal])
         first = Way(poses[None], Wanted("mm"), measured(1000.0))
         measure = pilots({None: 1000.0, "lying": 2000.0, "on-edge": share * 1000.0})
         best = propose_quicker(first, lambda one: poses[one.pose], measure)
+        assert best.wanted.pose == taken
+
+
+def test_a_time_that_nobody_would_run_is_worth_some_sonotrodes(
+    poses: dict[Pose | None, Proposal],
+) -> None:
+    blocks = poses["on-edge"].design.sonotrode.blocks
+    assert blocks is not None
+    assert blocks.count <= SEVERAL
+    for alone, beside, taken in ((1700.0, 840.0, None), (2000.0, 990.0, "on-edge")):
+        times: dict[Pose | None, float] = {None: alone, "lying": 1990.0, "on-edge": beside}
+        first = Way(poses[None], Wanted("mm"), measured(alone))
+        best = propose_quicker(first, lambda one: poses[one.pose], pilots(times))
         assert best.wanted.pose == taken
 
 
