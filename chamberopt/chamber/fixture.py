@@ -36,6 +36,7 @@ from chamberopt.chamber.part import chosen_on_part, turning_axis
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import typeset_plain
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, lofted
+from chamberopt.geometry.cut import piece_beyond
 from chamberopt.geometry.meshes.self_intersection import crossing_pairs
 from chamberopt.geometry.meshes.surface_error import format_point
 from chamberopt.geometry.outline import (
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
 
     from chamberopt.chamber.part import Part
     from chamberopt.design.design import Design
+    from chamberopt.design.fixture import Mask
 
 SINK = 1e-6  # m: depth of a holder's end in the part, so that rounding leaves no gap between them
 FARTHEST = 1e-3  # share of the part's extent: what reaches farthest, without `holder.at`
@@ -70,6 +72,7 @@ ACROSS = 0.2  # largest mean cosine between the axis of an arbor and the normals
 ON_AXIS = 1e-5  # m: a holder this close to the axis about which the part turns is on it
 # Longest way of a vertex of a shell over its thickness: the shell is cut off over sharper edges.
 MITRE = 2.0
+FAR = 20.0  # distances from the target that are told apart, over the margin of a mask
 # Smallest spread of normals at a vertex that counts as an edge, as a share of their mean square.
 CREASE = 0.01
 
@@ -450,6 +453,8 @@ def _mask(design: Design, part: Part, filled: CavitySolid) -> _Made:
     length, size = 0.0, (mask.thickness,) if axis is None else ()
     if axis is None:
         way = _offsets(vertices, triangles, mask.thickness)
+        if mask.margin > 0.0:
+            vertices, triangles, way = _away_from_target(part, vertices, triangles, way, mask)
     else:
         far = float((filled.body.surface().vertices @ axis).max())
         length = far - float((vertices @ axis).min())
@@ -466,6 +471,36 @@ def _mask(design: Design, part: Part, filled: CavitySolid) -> _Made:
             f"each other; {remedy}"
         )
     return _Made([surface], covered, "shell" if axis is None else "filled", size, length)
+
+
+def _away_from_target(
+    part: Part, vertices: np.ndarray, triangles: np.ndarray, way: np.ndarray, mask: Mask
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what of a piece of the part's surface keeps the mask's margin, and its ways.
+
+    It is sunk into the part, because its own border divides the part's triangles.
+
+    Args:
+        way: way of each vertex through the shell [m], (n, 3).
+    Raises:
+        InputError: all of the piece is too near to the target.
+    """
+    from sim_core import TriangleMesh, closest_points
+
+    surface = TriangleMesh(part.vertices, part.triangles, part.target.astype(np.uint8))
+    margin = mask.margin
+
+    def distance(places: np.ndarray) -> np.ndarray:
+        return closest_points(surface, places, FAR * margin, tag=1).distance
+
+    vertices, triangles, way = piece_beyond(vertices, triangles, distance, margin, way)
+    if not len(triangles):
+        raise InputError(
+            f"mask.margin_mm: all faces of mask.at are nearer than {1e3 * margin:g} mm to the "
+            "target; give less, or other faces"
+        )
+    sunk = SINK / mask.thickness * way
+    return vertices - sunk, triangles, way + sunk
 
 
 def _plugs(part: Part, chosen: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:

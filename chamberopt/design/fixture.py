@@ -123,7 +123,9 @@ class Mask(FileTable):
         "no shell, but all that is on these faces along this way, up to the wall",
         None,
     )
-
+    margin_mm: float = quantity(
+        0, 100, "mm", "from the target, which a shell keeps, so that balls get to its border", 0.0
+    )
     plugs: bool = Field(
         default=False,
         description="no shell, but the holes whose walls these faces are are filled to their rims",
@@ -134,9 +136,13 @@ class Mask(FileTable):
         if self.axis is not None and self.thickness_mm is not None:
             text = "given beside axis, along which the mask goes on to the wall; leave one out"
             yield Problem("thickness_mm", text)
-        for key in ("axis", "thickness_mm"):
-            if self.plugs and getattr(self, key) is not None:
+        if self.axis is not None and self.margin_mm:
+            yield Problem("margin_mm", "given beside axis: only a shell keeps it; leave one out")
+        for key in ("axis", "thickness_mm", "margin_mm"):
+            if self.plugs and getattr(self, key):
                 yield Problem(key, "given beside plugs, which fill their holes; leave one out")
+
+    margin = SI("margin_mm", 1e-3, "Distance from the target that a shell keeps [m]")
 
     @property
     def thickness(self) -> float:

@@ -214,7 +214,9 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     for table, name in (("holder", "held by"), ("mask", "masked by")):
         own = {key: one for key, one in tables.items() if key.partition(".")[0] == table}
         if own:
-            kind = own.get(table, {}).get("kind", "pad" if "axis" in own.get(table, {}) else "")
+            made_by = {"axis": "pad", "thickness_mm": "shell"}  # kinds of masks
+            kind = next((text for key, text in made_by.items() if key in own.get(table, {})), "")
+            kind = own.get(table, {}).get("kind", kind)
             sizes = ", ".join(
                 f"{'flange ' * (kind == 'arbor' and key != 'grip_mm')}{in_words(key)} {value:g} mm"
                 for one in own.values()

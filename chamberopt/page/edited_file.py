@@ -407,7 +407,8 @@ def _numbers(design: Design) -> Iterator[tuple[str, FieldInfo]]:
     if design.holder is not None:  # keys of other kinds
         own = ("kind", "axis", *HOLDER_KEYS[design.holder.kind])
         absent += [f"holder.{key}" for key in Holder.model_fields if key not in own]
-    of_mask = {"shell": ("axis",), "plugs": OF_MASK, "block": ("thickness_mm",), NO_MASK: ()}
+    of_shell = ("thickness_mm", "margin_mm")
+    of_mask = {"shell": ("axis",), "plugs": OF_MASK, "block": of_shell, NO_MASK: ()}
     absent += [f"mask.{key}" for key in of_mask[mask_kind(design)]]
     hidden = (*NOT_SHOWN, *absent)
     for name, field in design.numeric_fields():

@@ -30,7 +30,8 @@ MASK_KINDS: dict[str, dict[str, Any]] = {
     "plugs": {"plugs": True},
     "block": {},  # with an axis, which the way of its faces gives
 }
-OF_MASK = ("axis", "plugs", "thickness_mm")  # keys that a mask may have beside its faces
+# Keys that a mask may have beside its faces.
+OF_MASK = ("axis", "plugs", "thickness_mm", "margin_mm")
 STEP = re.compile(r"steps\.(\d+)(?=\.|$)")
 KEPT = "steps"  # numbers of the file's steps that stay; further keys count those that are left
 FIRST = "first"  # name of the step that the design without steps becomes

@@ -42,6 +42,7 @@ MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
 SEEN_OUT = 1e-3  # m by which a part stands out of a side
 MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area over the largest
 MOST_HOLDERS = 6  # that are tried
+CLEAR = 1.5  # distance of a mask from the target, over the diameter of a ball
 # Share of the target that a holder may keep from the balls; where no other holds the part.
 HIDDEN, MOST_HIDDEN = 0.005, 0.03
 LEAST_LEFT, MOST_LEFT = 0.005, 0.15  # share of the target that is left out if no ball touches it
@@ -172,20 +173,31 @@ def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> P
 def masked(bare: Proposal, floor: Floor, bores: Sequence[Bore], shop: Shop | None) -> Proposal:
     """Return a proposal with a mask on what must not be peened, where that does no harm.
 
-    Holes are plugged, also those that a wall cuts and through which balls would leave. Where a mask
-    would do harm, the surfaces stay bare and are named.
+    Holes are plugged, also those that a wall cuts and through which balls would leave. What runs in
+    another part gets a sleeve that ends before the target. Where a mask would do harm, the surfaces
+    stay bare and are named.
     """
-    names = to_be_masked(bare.design, bare.chamber, bare.known)
-    holes = to_be_plugged(bare.design, bare.chamber, bores, names)
-    if "mask" in bare.tables or not (names or holes) or bare.design.effects.part_turn is not None:
+    fits, runs = to_be_masked(bare.design, bare.chamber, bare.known)
+    holes = to_be_plugged(bare.design, bare.chamber, bores, fits)
+    if "mask" in bare.tables or bare.design.effects.part_turn is not None:
         return bare
-    if holes and are_holes(bare.mesh, bare.known, names, holes):
+    if holes and are_holes(bare.mesh, bare.known, fits, holes):
         sizes = ", ".join(f"{2e3 * one.radius:.3g}" for one in holes)
         text = f"plugs in holes of {sizes} mm, not to be peened, or open to the outside"
         keys: dict[str, Any] = {"plugs": True, "at": {"faces": [one.wall for one in holes]}}
+    elif runs:
+        margin = 0.5 * math.ceil(2e3 * CLEAR * max(bare.design.shot.diameters))
+        text = (
+            f"a sleeve on {', '.join(runs + fits)}: runs or fits, by the name; it ends {margin:g} "
+            "mm before the target, so that balls get to its border"
+        )
+        keys = {"margin_mm": margin, "thickness_mm": USUAL_SHELL_MM}
+        keys["at"] = {"surface": runs + fits}
+    elif fits or holes:
+        text = f"a cap on {', '.join(fits)}: not to be peened, by the name"
+        keys = {"thickness_mm": USUAL_SHELL_MM, "at": {"surface": fits}}
     else:
-        text = f"a cap on {', '.join(names)}: not to be peened, by the name"
-        keys = {"thickness_mm": USUAL_SHELL_MM, "at": {"surface": names}}
+        return bare
     reasons = {**bare.reasons, f"mask.{next(iter(keys))}": text}
     return _harmless(_with_mask(bare.tables, keys), reasons, floor, bare, shop)[0] or bare
 

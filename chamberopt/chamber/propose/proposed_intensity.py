@@ -215,7 +215,7 @@ def beside_larger(
     )
     text = (
         f"WITH LARGER BALLS, {then.in_words}: {there}, beside {here} with {now.in_words} "
-        f"(--ball-mm {then.ball_mm:g} takes them); both, one after the other, do not pay: {why}"
+        f"(--ball-mm {then.ball_mm:g} takes them), and both, one after the other, do not pay: {why}"
     )
     reasons = {**made.reasons, INTENSITY: f"{made.reasons[INTENSITY]}; {text}"}
     return replace(made, reasons=reasons)

@@ -89,10 +89,18 @@ def to_be_plugged(
     return found
 
 
-def to_be_masked(design: Design, chamber: Chamber, known: Sequence[Surface]) -> list[str]:
-    """Return the names of surfaces that the shot meets and that must not be peened."""
-    named = [one for one in known if "surface" in one.keys and NEVER.search(one.name)]
-    return [one.name for one in named if is_met(design, chamber, one)]
+def to_be_masked(
+    design: Design, chamber: Chamber, known: Sequence[Surface]
+) -> tuple[list[str], list[str]]:
+    """Return the names of surfaces that the shot meets and that must not be peened.
+
+    The first are of what fits to other parts, such as bores; the second of what runs in them, such
+    as a pin beside its fillets.
+    """
+    named = [one for one in known if "surface" in one.keys and is_met(design, chamber, one)]
+    fits = [one.name for one in named if NEVER.search(one.name)]
+    runs = [one.name for one in named if RUNNING.search(one.name) and one.name not in fits]
+    return fits, runs
 
 
 def pads(mesh: PartMesh, target: np.ndarray, turns: Turns, ball: float) -> list[dict[str, Any]]:

@@ -128,6 +128,18 @@ CASES: dict[str, tuple[str, dict[str, Any], float, float]] = {
         22 * 14 * 9 - np.prod(BOX),
         PLATE + 8 * 64,
     ),
+    "mask that keeps a margin": (
+        "box",
+        {"mask": {"at": ROUND, "thickness_mm": 1.0, "margin_mm": 3.0}},
+        (22 * 14 - 20 * 12) * (8 - 3),
+        64 * (8 - 3),
+    ),
+    "mask of a shaft with a margin": (
+        "shaft",
+        {"mask": {"at": ROUND, "thickness_mm": 2.0, "margin_mm": 4.0}},
+        21 * 64 * np.tan(np.pi / 64) * ((RADIUS * np.cos(np.pi / 64) + 2) ** 2) - 21 * polygon(12),
+        21 * 64 * 12 * np.sin(np.pi / 64),
+    ),
     "mask up to the wall": (
         "box",
         {"mask": {"at": UP, "axis": (0.0, 0.0, 1.0)}},
@@ -157,9 +169,10 @@ def test_volumes_and_areas_are_those_of_closed_forms(parts: Path, case: str) -> 
     chamber = build_chamber(design(parts, mesh, **tables))
 
     sound(chamber)
-    assert taken(chamber, mesh) == pytest.approx(volume, abs=SUNK * 500.0)
+    rel = 1e-3 if "margin" in case else 0.0  # edges are not divided close to their ends
+    assert taken(chamber, mesh) == pytest.approx(volume, abs=SUNK * 500.0, rel=rel)
     covered_mm2 = 1e6 * sum(one.covered for one in chamber.fixtures.values())
-    assert covered_mm2 == pytest.approx(covered, abs=SUNK * 70.0)
+    assert covered_mm2 == pytest.approx(covered, abs=SUNK * 70.0, rel=rel)
     part, target = chamber.part, chamber.part.target
     # Nothing of the target is covered: its triangles in the cavity have all of its area.
     assert chamber.exposed_area[target] == pytest.approx(part.area[target], rel=1e-9)
@@ -269,6 +282,10 @@ def test_a_rod_may_come_from_a_side_wall(parts: Path, facing: tuple[float, ...])
         ("box", {"mask": {"at": NOT_DOWN, "axis": (0.0, 0.0, -1.0)}}, r"mask\.axis: given .* none"),
         ("box", {"mask": {"at": UP, "axis": (0.0, 0.0, 1.0), "thickness_mm": 1.0}},
          r"mask\.thickness_mm: given beside axis"),
+        ("box", {"mask": {"at": UP, "axis": (0.0, 0.0, 1.0), "margin_mm": 1.0}},
+         r"mask\.margin_mm: given beside axis"),
+        ("box", {"mask": {"at": ROUND, "margin_mm": 9.0}},
+         r"mask\.margin_mm: all faces of mask\.at are nearer than 9 mm"),
         ("box", {"mask": {"at": UP}, "effects": {"part_turn": {"rpm": 30.0}}},
          r"mask: given for a part that turns"),
         ("box", {"holder": {"kind": "plate"}, "effects": {"part_turn": {"rpm": 30.0}}},

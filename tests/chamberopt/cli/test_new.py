@@ -76,7 +76,7 @@ def test_a_long_part_hangs_where_no_sonotrode_carries_it_lying(tmp_path: Path) -
     assert abs(up[2]) == pytest.approx(1.0)
     assert made.design.chamber.diameter_mm == 80.0
     assert made.design.holder is not None
-    assert "on end, as no sonotrode" in made.reasons["part.rotate_deg"]
+    assert "on end, as no single sonotrode" in made.reasons["part.rotate_deg"]
     vertices, faces, normals = strip.vertices, strip.faces, strip.face_normals
     lying = (0.0, 0.0, 0.0)
     assert hanging_pose(vertices, faces, np.abs(normals[:, 1]) > 0.5, lying)

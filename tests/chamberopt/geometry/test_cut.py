@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.geometry.cut import cut_at_box
+from chamberopt.geometry.cut import cut_at_box, piece_beyond
 from chamberopt.geometry.smoothing.divide import Surface
 from chamberopt.geometry.triangles import areas, edge_keys, unit_normals
 
@@ -67,3 +67,22 @@ def test_a_side_of_the_box_close_to_a_corner_makes_no_sliver() -> None:
     surface = surface_of(cube)
     whole = cut_at_box(surface, box, np.ones(len(cube.faces), dtype=bool))
     assert len(whole.triangles) == len(cube.faces)
+
+
+@pytest.mark.parametrize("least", [0.3, 2.0])
+def test_a_piece_beyond_a_distance_lacks_a_disc(least: float) -> None:
+    """Two triangles of a square of 10, and what is farther than a distance from its middle."""
+    square = np.array([[-5.0, -5.0, 0.0], [5.0, -5.0, 0.0], [5.0, 5.0, 0.0], [-5.0, 5.0, 0.0]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3]])
+
+    def distance(places: np.ndarray) -> np.ndarray:
+        return np.asarray(np.linalg.norm(places, axis=1))
+
+    vertices, kept, values = piece_beyond(square, triangles, distance, least, 2.0 * square)
+    np.testing.assert_allclose(values, 2.0 * vertices, atol=1e-12)
+    # The border is a polygon whose sides are up to 2 % of the distance too near.
+    disc = 100.0 - areas(vertices, kept).sum()
+    assert disc == pytest.approx(np.pi * least**2, rel=0.04)
+    assert (distance(vertices) > 0.95 * least).all()
+    assert trimesh.Trimesh(vertices, kept, process=False).euler_number == 0  # a ring
+    assert len(piece_beyond(square, triangles, distance, 8.0, square)[1]) == 0

@@ -1,5 +1,6 @@
 """Ends that a clamp holds outside, and faces of a part that close its chamber."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from chamberopt.chamber.propose.proposed_end import (
     closing_faces,
     local_room,
 )
+from chamberopt.chamber.propose.proposed_mask import rows_of
 from chamberopt.chamber.propose.proposed_target import Target, propose_sizes
 from tests.chamberopt.chamber.propose.test_proposed_arbor import drum, part_of
 from tests.helpers.eight_parts import EIGHT_PARTS
@@ -162,3 +164,10 @@ def test_a_crank_pin_gets_a_chamber_between_its_webs(tmp_path: Path) -> None:
     assert made.design.holder is not None
     assert (made.design.holder.kind, made.design.holder.clearance_mm) == ("bore", 0.2)
     assert not made.jams
+    # The pin runs in a bearing: a sleeve covers all of its 30 mm but one and a half ball each end.
+    sleeve, margin = made.chamber.fixtures["mask"], made.tables["mask"]["margin_mm"]
+    assert (sleeve.kind, margin) == ("shell", 0.5 * math.ceil(3.0 * made.design.shot.diameter_mm))
+    around = 1e6 * made.chamber.part.area[rows_of(made.design, {"surface": ["PIN"]})].sum() / 30.0
+    assert 1e6 * sleeve.covered == pytest.approx((30.0 - 2.0 * margin) * around, rel=1e-3)
+    assert sleeve.covered_target == 0.0
+    assert "a sleeve on PIN" in made.reasons["mask.margin_mm"]

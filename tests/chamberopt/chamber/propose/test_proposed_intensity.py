@@ -410,7 +410,7 @@ def test_where_balls_are_too_weak_the_next_larger_ones_are_told_beside_them(
     text = told.reasons[INTENSITY]
     assert "WITH LARGER BALLS, 2 mm at 40 µm: about 0.12 mmA, " in text
     assert "of the target served, 98 % after about 100 s, beside about 0.05 mmA, " in text
-    assert text.endswith("; both, one after the other, do not pay: they jam")
+    assert text.endswith(", and both, one after the other, do not pay: they jam")
     for enough in (pilot_of(0.12, 600.0), pilot_of(0.2, 600.0), None):
         assert larger_balls(made, wanted, asked, enough, again, measure) is None
     fixed = replace(wanted, ball_mm=1.0)

@@ -81,7 +81,7 @@ def test_each_size_peens_for_its_own_time_in_one_chamber(coarse: Proposal, tmp_p
     [
         (None, FINER, "no pilot resolved the coarse balls"),
         (pilot(600.0, 0.3), COARSE, "no smaller ball"),
-        (pilot(600.0, 0.3), 2.5, "3 mm serve"),  # which are as large beside the slot
+        (pilot(600.0, 0.3), 2.5, "the smaller ones serve hardly more"),  # large beside the slot
     ],
 )
 def test_one_size_stays_where_finer_ones_bring_nothing(
