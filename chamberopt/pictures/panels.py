@@ -31,6 +31,8 @@ SIZE = 620, 620  # pixels of a view, at most
 BORDER, BORDER_OF_CHAMBER = 25, 95  # pixels; the larger one has room for dimensions
 WHOLE = 1.3  # longest part that is shown whole, over the length of its target
 NEAR_CAPTIONS = "the target", "what is hidden there"
+ALIKE_CAPTION = "the target, alike from the other side"
+ALIKE = 3.0  # mean difference of two images, of 255, up to which they show the same
 
 Add = Callable[[Any], None]
 """Puts something into a plotter."""
@@ -85,6 +87,18 @@ def part_panels(
         Panel(view, "in the chamber", dimensions, points),
         *near_panels(add, target, part, near),
     ]
+
+
+def without_twin(panels: Sequence[Panel]) -> list[Panel]:
+    """Return panels of a target without the second if it shows the same as the first.
+
+    So it is with both flanks of a slot that is alike on both sides.
+    """
+    if len(panels) == 2:
+        one, other = (panel.view.image.astype(float) for panel in panels)
+        if one.shape == other.shape and np.abs(one - other).mean() < ALIKE:
+            return [panels[0]._replace(caption=ALIKE_CAPTION)]
+    return [*panels]
 
 
 def near_panels(

@@ -14,7 +14,14 @@ from chamberopt.chamber.flexure import softness_of_part
 from chamberopt.pictures.actors import FAULT, NO_RENDER, add_edges
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, pushed_back, seen_area
 from chamberopt.pictures.charts.colours import BLUE, KINDS
-from chamberopt.pictures.panels import BORDER, SIZE, choose_views, near_panels, part_panels
+from chamberopt.pictures.panels import (
+    BORDER,
+    SIZE,
+    choose_views,
+    near_panels,
+    part_panels,
+    without_twin,
+)
 from chamberopt.pictures.picture_page import Panel, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess, picture_path
 from chamberopt.pictures.view import render_view
@@ -202,6 +209,9 @@ def _panels(
         ]
     if job["chamber"] is None:
         eyes = near_directions(target)
-        return near_panels(add, target, part, near_views(seen_area(target, rest, eyes), eyes))
+        near = near_views(seen_area(target, rest, eyes), eyes)
+        return without_twin(near_panels(add, target, part, near))
     chamber = job["chamber"]
-    return part_panels(add, target, part, chamber, choose_views([(target, part)], [chamber]))
+    views = choose_views([(target, part)], [chamber])
+    whole, *of_target = part_panels(add, target, part, chamber, views)
+    return [whole, *without_twin(of_target)]
