@@ -355,12 +355,14 @@ def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
         text = "the hardness of these balls is not known, and their restitution follows from it"
         raise InputError(f"--shot: given {name!r}; {text}; give one of {known}")
     hardness = alloy(part).hardness_HB
-    is_implant, metal = IMPLANT in part.split(), alloy(part).metal
-    if not name and (is_implant or metal in IRON) and shop.has(CERAMIC):
-        return CERAMIC, f"steel leaves iron on {'an alloy of implants' if is_implant else metal}"
+    metal, is_stainless = alloy(part).metal, alloy(part).stainless
+    spoiled = metal if metal in IRON else "stainless steel" if is_stainless else ""
+    spoiled = "an alloy of implants" if IMPLANT in part.split() else spoiled
+    if not name and spoiled and shop.has(CERAMIC):
+        return CERAMIC, f"steel leaves iron on {spoiled}"
     if name or (ball(STEEL).hardness_HB or 0.0) >= HARDER * hardness or not shop.has(HARD):
         found = ball(name or STEEL).name
-        on_steel = ON_STAINLESS if alloy(part).stainless else ""
+        on_steel = ON_STAINLESS if is_stainless else ""
         return found, IRON.get(metal, on_steel) if found == STEEL else ""
     return HARD, f"harder than the part, of {hardness:g} HB, which steel balls hardly dent"
 

@@ -147,6 +147,7 @@ def test_a_pose_is_said_as_a_fixture_gives_it(
         ("zirconia", "7075-T6", "", "zirconia"),
         ("", "Ti-6Al-4V ELI", "", "zirconia"),  # of implants
         ("", "7075-T6", "", "zirconia"),  # steel leaves iron on it
+        ("", "17-4PH", "", "zirconia"),  # likewise
         ("", "7075-T6", "steel", "steel"),
     ],
 )
