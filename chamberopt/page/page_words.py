@@ -126,7 +126,7 @@ _AMPLITUDE = re.compile(r"an amplitude of about ([\d.]+) µm zero-to-peak")
 def balls_named(text: str) -> list[float]:
     """Return the diameters [mm] of balls that a matter says would serve.
 
-    >>> balls_named("MANY BALLS, some 7,958 under the whole part: 0.7 mm would serve 80%")
+    >>> balls_named("MANY BALLS, to be dosed and sorted: 0.7 mm would serve 80%")
     [0.7]
     """
     return list(dict.fromkeys(float(next(filter(None, one))) for one in _BALLS.findall(text)))

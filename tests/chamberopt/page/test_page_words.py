@@ -8,7 +8,7 @@ from chamberopt.page.page_words import TERMS, amplitudes_named, balls_named, exp
 @pytest.mark.parametrize(
     ("matter", "balls", "amplitudes"),
     [
-        ("MANY BALLS, some 7,958 under the whole part: 0.7 mm would serve 80%", [0.7], []),
+        ("MANY BALLS, to be dosed and sorted: 0.7 mm would serve 80%", [0.7], []),
         ("LARGER BALLS: they serve 60%, and 1 mm would serve 90%, with about 0.2 mmA "
          "(--ball-mm 1 takes these)", [1.0], []),
         ("NOT IN THE RANGE: it takes an amplitude of about 55 µm zero-to-peak, or balls of about "
