@@ -369,11 +369,12 @@ def reason_without_model(count: int, failed: int, parameters: int) -> str:
     """
     needed = POINTS_PER_PARAMETER * parameters
     if count - failed < needed:
-        evaluations = f"{count} evaluations" + (
+        evaluations = f"{count} evaluation{'s' * (count != 1)}" + (
             f", {failed} of them not simulated," if failed else ""
         )
+        few = "is too few" if count == 1 else "are too few"
         return (
-            f"{evaluations} are too few to tell what each parameter does: {needed} or more are "
-            "needed for a model of them."
+            f"{evaluations} {few} to tell what each parameter does: {needed} or more are needed "
+            "for a model of them."
         )
     return "This result holds no model of the evaluations, so the effect of parameters is unknown."

@@ -137,7 +137,7 @@ def _prepare(
     )
     teller.compile(study.design, chamber, None)
     if done := len(folder.recorded.trials):
-        teller.tell(f"{folder.path}: resuming after {done} evaluations")
+        teller.tell(f"{folder.path}: resuming after {done} evaluation{'s' * (done != 1)}")
     return study, advice
 
 
