@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_balls import (
+    AS_GOOD,
     fit_sizes,
     mostly_serving,
     serving_sizes,
@@ -128,7 +129,8 @@ def choose(
     The same intensity takes the less time the larger the amplitude, with smaller balls. Where balls
     elsewhere in the range serve more of the target, these are taken: an intensity is known to a
     factor, and what no ball touches stays bare. Where no setting is in the middle half of the
-    range, it is the one nearest to the middle.
+    range, it is the one nearest to the middle; where none is in the range, of those that serve as
+    much as any: less of the target would be served, and the intensity still missed.
 
     Args:
         served: share of the target that each size serves, by diameter [mm]; all of it by default.
@@ -139,12 +141,13 @@ def choose(
     }
     half = 0.5 * MIDDLE * math.log(wanted.high / wanted.low)
     inside = [one for one in settings if not wanted.off(expected_intensity(one, simulated))]
-    shares = {one: (served or {}).get(one.ball_mm, 1.0) for one in inside}
-    best = [one for one in inside if shares[one] >= max(shares.values()) - ALIKE]
+    shares = {one: (served or {}).get(one.ball_mm, 1.0) for one in inside or settings}
+    least = max(shares.values()) - (ALIKE if inside else AS_GOOD)
+    best = [one for one in shares if shares[one] >= least]
     middle = [one for one in best if off[one] <= half]
-    if middle:
+    if inside and middle:
         return max(middle, key=lambda one: (one.amplitude_um, -off[one]))
-    return min(best or settings, key=lambda one: off[one])
+    return min(best, key=lambda one: off[one])
 
 
 def with_amplitude(made: Proposal, setting: Setting) -> Proposal:

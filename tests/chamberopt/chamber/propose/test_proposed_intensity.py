@@ -415,3 +415,11 @@ def test_where_balls_are_too_weak_the_next_larger_ones_are_told_beside_them(
         assert larger_balls(made, wanted, asked, enough, again, measure) is None
     fixed = replace(wanted, ball_mm=1.0)
     assert larger_balls(made, fixed, asked, weak, again, measure) is None
+
+
+@pytest.mark.parametrize(("low", "taken"), [(0.25, 1.5), (0.35, 1.2)])
+def test_balls_that_serve_less_are_taken_only_into_the_range(low: float, taken: float) -> None:
+    fine, coarse = Setting(1.2, 40.0), Setting(1.5, 40.0)
+    wanted = WantedIntensity(low, 1.2 * low, "")
+    found = choose(wanted, [fine, coarse], {fine: 0.2}, {1.2: 0.99, 1.5: 0.93})
+    assert found.ball_mm == taken
