@@ -198,7 +198,8 @@ def test_a_short_real_run() -> None:
     whole = evaluate(design, chamber, executor)
     runs = simulate_ends(design, chamber, whole, executor, lambda *at: done.append(at))
     assert runs is not None
-    assert done == [(k, 4, None) for k in range(1, 5)]
+    assert done == sorted(done)
+    assert done[-1] == (4, 4, None)
     (group,) = unknowns(design)
 
     def by_hand(factor: float, replicas: int = 2) -> Evaluation:

@@ -236,6 +236,8 @@ class TestCommandLine:
         self.at: dict[int, Callable[[], None]] = {}
         monkeypatch.setattr("chamberopt.search.run_study.ChamberSimulator", lambda *_: simulator)
         monkeypatch.setattr("chamberopt.workflows.optimise.study_ranges", lambda *_: None)
+        # A forked process has none of the threads that manifold cuts with, and would wait for them.
+        monkeypatch.setattr("chamberopt.workflows.optimise.build_chamber", lambda *_: chamber)
         monkeypatch.setattr("chamberopt.cli.teller.compile_with_message", lambda *_: None)
         monkeypatch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
         return done
