@@ -161,9 +161,8 @@ def simulate(
             calibrated, in as many replicas again. The figures are in result.record.ranges.
         workers: number of threads, by default one per core. It does not change the result.
         progress: True to show bars in a terminal or notebook, False for nothing, or a function,
-            called as progress(done, total, None) after each replica, and
-            meanwhile with the parts of those that run. It counts those of the ranges
-            anew.
+            called as progress(done, total, None) after each replica, and meanwhile with the parts
+            of those that run. It counts those of the ranges anew.
     Raises:
         InputError: the chamber cannot be built, has no room for the shot or is not analytic.
         sim_core.SimulationError: a simulation had to stop.
@@ -315,8 +314,8 @@ def peen_strip(
         place: type, size and place of the strip. None for an A strip of full size in the lid.
         workers: number of threads, by default one per core; it does not change the result.
         progress: True for bars, False for nothing, or a function, called as
-            progress(done, total, None) after each replica, and
-            meanwhile with the parts of those that run.
+            progress(done, total, None) after each replica, and meanwhile with the parts of those
+            that run.
     Raises:
         InputError: the strip does not fit, or the design lacks the zone.
     """
@@ -506,8 +505,8 @@ def impacts(
             result; None for all.
         workers: number of threads, by default one per core.
         progress: True for bars, False for nothing, or a function, called as
-            progress(done, total, None) after each replica, and
-            meanwhile with the parts of those that run.
+            progress(done, total, None) after each replica, and meanwhile with the parts of those
+            that run.
     Raises:
         InputError: the simulation is not the result's, or pandas is missing (extra "notebook").
     """
