@@ -272,7 +272,7 @@ def _effect_text(name: str, value: object) -> str:
         return "off"
     if isinstance(value, Mapping):
         return ", ".join(
-            f"{key} = {value_text(one)}" for key, one in value.items() if one is not None
+            f"{key} = {value_text(one, 6)}" for key, one in value.items() if one is not None
         )
     if name == "rest" and value is None:
         return "on where a still surface faces up"
