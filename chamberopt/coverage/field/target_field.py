@@ -307,7 +307,7 @@ def find_target_field(chamber: Chamber, mesh: Rooms, setting: WindowSetting) -> 
     """
     part, gauge = chamber.part, setting.gauge
     area = np.where(part.target, part.area, 0.0)
-    faces, creases = find_faces(part.vertices, part.triangles, part.target)
+    faces, creases = _faces(chamber)
     face = faces.of_triangle
     radius, corners = float(np.sqrt(gauge / np.pi)), part.vertices[part.triangles]
     ball = 0.5 * setting.ball
@@ -337,6 +337,13 @@ def find_target_field(chamber: Chamber, mesh: Rooms, setting: WindowSetting) -> 
 
 
 @computed_once(4)
+def _faces(chamber: Chamber) -> tuple[Faces, Creases]:
+    """Return the smooth faces of a chamber's part, and the creases of its target."""
+    part = chamber.part
+    return find_faces(part.vertices, part.triangles, part.target)
+
+
+@computed_once(4)
 def _whole_surface(
     chamber: Chamber, mesh: TriangleMesh, ball: float, longest: float
 ) -> SurfacePieces:
@@ -346,9 +353,8 @@ def _whole_surface(
         ball: radius of the smallest ball [m].
         longest: longest side of a piece [m].
     """
-    part = chamber.part
-    faces, _ = find_faces(part.vertices, part.triangles, part.target)
-    return _pieces(chamber, part.target, faces.of_triangle, mesh, ball, longest)
+    face = _faces(chamber)[0].of_triangle
+    return _pieces(chamber, chamber.part.target, face, mesh, ball, longest)
 
 
 def _pieces(
