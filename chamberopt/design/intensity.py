@@ -48,6 +48,7 @@ FORM = (
 )
 INCH_MM = 25.4
 NEAR_ENOUGH = 1.1
+AT_STEP = 0.05  # share of THICK_MM within which both ranges are told
 THIN_MM, THICK_MM = 0.090 * INCH_MM, 0.375 * INCH_MM
 STRONG_MPa = 1379.0  # tensile strength of steel: 200,000 psi
 STRONG_HB = 390.0  # hardness of such steel, by the conversions of ASTM A370: by heart
@@ -248,7 +249,12 @@ def usual_intensity(alloy: Alloy, thickness: float) -> WantedIntensity | None:
     is_thick = 1e3 * thickness > THICK_MM
     low, high = (round(INCH_MM * one, 2) for one in ranges[is_thick])
     edge = f"above {THICK_MM:.3g} mm" if is_thick else f"of {plain(1e3 * thickness, 2)} mm"
-    return WantedIntensity(low, high, f"usual for {what} {edge} by {TABLE}")
+    text = f"usual for {what} {edge} by {TABLE}"
+    at_step = abs(1e3 * thickness - THICK_MM) < AT_STEP * THICK_MM
+    if at_step and ranges[0] != ranges[1]:
+        other = "-".join(f"{INCH_MM * one:.2g}" for one in ranges[not is_thick])
+        text += f" ({other}A {'up to' if is_thick else 'above'} {THICK_MM:.3g} mm)"
+    return WantedIntensity(low, high, text)
 
 
 def _is_strong(alloy: Alloy) -> bool:
@@ -262,7 +268,7 @@ def why_none(alloy: Alloy, thickness: float) -> str:
     """Return in words why there is no usual range for an alloy of some thickness [m]."""
     if math.isfinite(thickness) and 1e3 * thickness < THIN_MM:
         return (
-            f"the target is {plain(1e3 * thickness, 2)} mm thick or less, where {TABLE} has no "
-            f"range (below {THIN_MM:.2g} mm): agree on one with your customer"
+            f"much of the target is {plain(1e3 * thickness, 2)} mm thick or less, where {TABLE} "
+            f"has no range (below {THIN_MM:.2g} mm): agree on one with your customer"
         )
     return f"{TABLE} has no range for {alloy.metal}: take that of your drawing"

@@ -96,16 +96,17 @@ CERAMIC, IMPLANT = "zirconia", "ELI"
 # Least hardness of steel balls over the part's. A part as hard as they are is hardly dented: in
 # pilots of a gear of 650 HB tungsten carbide left 9 times the dents.
 HARDER = 1.25
+HARDENED_HB = 280.0  # of steel: from here on it was hardened, to what its name does not tell
 # By metal of the part. Of aluminium: SAE AMS-S-13165, note 5 to table VI (design/intensity.py).
 IRON = {
     "aluminium": "STEEL LEAVES IRON on aluminium: decontaminate (note 5 to table VI of SAE "
     "AMS-S-13165), or ceramic balls, such as --shot zirconia",
     "titanium": "STEEL LEAVES IRON on titanium: decontaminate, or ceramic balls, such as --shot "
-    "zirconia (by heart)",
+    "zirconia (no source read)",
 }
 ON_STAINLESS = (
     "STEEL LEAVES IRON on stainless steel, which rusts: passivate the part, or ceramic balls, such "
-    "as --shot zirconia (by heart)"
+    "as --shot zirconia (no source read)"
 )
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
 BETWEEN = "a plate that fits between the faces of the part, like the two walls beside them"
@@ -256,6 +257,7 @@ def _proposed(
         "shot.diameter_mm": ball_reason,
         **({"shot.material": shot_reason} if shot_reason else {}),
         "materials.part": "how balls rebound from it (C0, v0) is computed: to be calibrated"
+        + _hardness_in_words(part_alloy, shot)
         if wanted.alloy
         else "ALLOY NOT KNOWN, a guess: chamberopt materials lists alloys",
         "materials.wall": "hardened, as soft walls slow the balls; give yours",
@@ -284,7 +286,7 @@ def _proposed(
         if turning is not None:
             pose, turn = turning_pose(turning, mesh)
             common = {**tables, "effects": {**tables["effects"], "part_turn": turn}}
-            why_so = "on its axis, about which it turns, so that all of it passes the shot"
+            why_so = "its axis level: about it the part turns, so that all of it passes the shot"
             form = replace(wanted, shape=wanted.shape or "box")
         for number, wider in enumerate(WIDER):
             progress(number, len(WIDER), None)
@@ -296,8 +298,9 @@ def _proposed(
                 own = {**common, "part": part, **_floor_tables(floor)}
                 words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {why_so}"}
                 if turning is not None:
+                    words["part.rotate_deg"] = why_so
                     words["effects.part_turn"] = f"TURNED BY A DRIVE, at {RPM:g} rpm"
-                why = {**reasons, **words, **_floor_reasons(floor, is_local, goes_out)}
+                why = {**reasons, **words, **_floor_reasons(floor, goes_out)}
                 made = checked(own, why, floor, known, mesh, wanted.shop)
             except UnreadableError:
                 raise
@@ -336,7 +339,8 @@ def _proposed(
             if as_good and "holder" in other.tables:
                 made, floor = other, its_floor
     made = padded(masked(made, floor, bores, wanted.shop), floor, target, wanted.shop)
-    return only_touched(made, floor, wanted.shop)
+    made = only_touched(made, floor, wanted.shop)
+    return replace(made, reasons={**made.reasons, **_room_reason(made, floor)})
 
 
 def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
@@ -364,7 +368,29 @@ def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
         found = ball(name or STEEL).name
         on_steel = ON_STAINLESS if is_stainless else ""
         return found, IRON.get(metal, on_steel) if found == STEEL else ""
-    return HARD, f"harder than the part, of {hardness:g} HB, which steel balls hardly dent"
+    return HARD, f"harder than the part, of {hardness:g} HB: balls of steel dent it less"
+
+
+def _hardness_in_words(part: str, shot: str) -> str:
+    """Return what is said of a hardness that decides the balls or the intensity; else nothing.
+
+    The name of a steel that is hardened does not tell in which state the part is.
+
+    Args:
+        part: the part's alloy.
+        shot: material of the balls.
+    """
+    metal = alloy(part)
+    if metal.metal != "steel" or metal.stainless or metal.hardness_HB < HARDENED_HB:
+        return ""
+    state = metal.condition.replace(";", ",")
+    text = f"; HARDNESS ASSUMED, {metal.hardness_HB:g} HB ({state}): confirm it, as "
+    if shot == HARD:
+        return (
+            f"{text}it decides the balls: of steel they are no harder than the part, in use too, "
+            "and wear the sonotrode less (--shot steel)"
+        )
+    return f"{text}it decides which intensity is usual"
 
 
 def _read(path: Path, unit: str) -> PartMesh:
@@ -467,7 +493,9 @@ def _place(
             local = local_room(posed, mesh.triangles, target.triangles, sizes, at_wall)
             sizes = local.sizes
         try:
-            floor = floor_on_sonotrode(sizes, _round(posed), shop or usual_shop(), shop is None)
+            floor = floor_on_sonotrode(
+                sizes, _round(posed), shop or usual_shop(), shop is None, ball
+            )
             if shop is not None:
                 room, highest = require_room(floor.sizes, shop), float(posed[:, 2].max())
                 if highest < room.height - room.distance:  # a higher lid takes in the whole part
@@ -531,27 +559,57 @@ def _floor_tables(floor: Floor) -> Tables:
     }
 
 
-def _floor_reasons(floor: Floor, is_local: bool, goes_out: bool) -> dict[str, str]:
+def _floor_reasons(floor: Floor, goes_out: bool) -> dict[str, str]:
     sizes, one = floor.sizes, floor.face.sonotrode
-    first = next(key for key in sizes.plan if key.endswith("_mm"))
     where = "; the part goes out through it" if sizes.through_ceiling else ""
     where = f"; {BETWEEN}" if sizes.is_fixed else where
-    beside = "target, and the part goes out through the walls" if is_local else "part"
     where += "; " + OWN_LID if "z" in sizes.closed else ""
-    if sides := [one for one in sizes.closed if one != "z"]:
-        beside += f"; {OWN_WALL} at {' and '.join(sides)}: {CUT_OUT}"
     placed = "the target ends near the wall" if goes_out else "the target in the middle"
     key, _ = one.amplitude_nearest(AMPLITUDE_UM)
     kind = (
         "zero-to-peak, half of" if key == "amplitude_um" else "peak-to-valley, twice zero-to-peak"
     )
     kind += " peak-to-valley" if key == "amplitude_um" else ""
-    room = f"leaves at least {1e3 * sizes.gap:.3g} mm beside the {beside}"
     return {
-        f"chamber.{first}": f"{room}; {floor.reason}",
         "chamber.height_mm": f"sonotrode to ceiling{where}",
         "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point",
         **({"sonotrode.frequency_khz": one.note} if one.note else {}),
         **({"part.offset_mm": placed} if any(floor.offset_mm) else {}),
         f"sonotrode.{key}": f"{kind}; one to which the sonotrode can be set",
     }
+
+
+def _room_reason(made: Proposal, floor: Floor) -> dict[str, str]:
+    """Return the reason for a chamber's first size in plan, by its dotted name.
+
+    It tells how far the walls are from the part, or from the target where the part goes out.
+    """
+    sizes = floor.sizes
+    first = next(key for key in sizes.plan if key.endswith("_mm"))
+    room = f"leaves at least {1e3 * sizes.gap:.3g} mm beside the part"
+    if sizes.shape == "box" and not floor.lean:
+        room = f"leaves {_room_in_box(made)}"
+    if sides := [one for one in sizes.closed if one != "z"]:
+        room += f"; {OWN_WALL} at {' and '.join(sides)}: {CUT_OUT}"
+    return {f"chamber.{first}": f"{room}; {floor.reason}"}
+
+
+def _room_in_box(made: Proposal) -> str:
+    """Return in words how far each wall of an upright box is from the part, or from the target."""
+    part, chamber = made.chamber.part, made.tables["chamber"]
+    on_target = part.vertices[part.triangles[part.target]].reshape(-1, 3)
+    beside, before = [], []
+    for k, (name, key) in enumerate((("x", "length_mm"), ("y", "width_mm"))):
+        for side, sign in (("-", -1.0), ("+", 1.0)):
+            whole, target = (
+                0.5 * float(chamber[key]) - 1e3 * float((sign * one[:, k]).max())
+                for one in (part.vertices, on_target)
+            )
+            if whole > 0.0:
+                beside.append(f"{whole:.3g} mm at {side}{name}")
+            else:
+                before.append(f"{max(target, 0.0):.3g} mm at {side}{name}")
+    words = [f"{', '.join(beside)} beside the part"] if beside else []
+    if before:
+        words.append(f"{', '.join(before)} beside the target, where the part goes out")
+    return " and ".join(words)

@@ -189,7 +189,8 @@ def masked(bare: Proposal, floor: Floor, bores: Sequence[Bore], shop: Shop | Non
         margin = 0.5 * math.ceil(2e3 * CLEAR * max(bare.design.shot.diameters))
         text = (
             f"a sleeve on {', '.join(runs + fits)}: runs or fits, by the name; it ends {margin:g} "
-            "mm before the target, so that balls get to its border"
+            "mm before the target, so that balls get to its border; in halves where it cannot be "
+            "slid on"
         )
         keys = {"margin_mm": margin, "thickness_mm": USUAL_SHELL_MM}
         keys["at"] = {"surface": runs + fits}
@@ -212,22 +213,26 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     if not LEAST_LEFT < hidden < MOST_LEFT:
         return made
     target = {**made.tables["part.target"], "reachable": True}
+    tables = {**made.tables, "part.target": target}
+    narrowed = checked(tables, made.reasons, floor, made.known, made.mesh, shop)
     part, share = made.chamber.part, touched(made.design, made.chamber)
+    gone = part.area[part.target].sum() - part.area[narrowed.chamber.part.target].sum()
+    left_out = float(gone / part.area[part.target].sum())
+    if left_out < LEAST_LEFT:  # specks, which stay in the target
+        return made
     left = np.where(part.target, (1.0 - share) * part.area, 0.0)
     place = one_of(part.vertices[part.triangles].mean(axis=1), left)
     text = (
-        f"PLACES ARE LEFT OUT, {hidden:.1%} of the target, which no ball touches here, such as at"
+        f"PLACES ARE LEFT OUT, {left_out:.1%} of the target, which balls hardly touch here, such "
+        f"as at {place} in the chamber: agree on it, or take smaller balls (--ball-mm)"
     )
-    text += f" {place} in the chamber: agree on it, or take smaller balls (--ball-mm)"
     if (radius := _narrow_fillets(made, left)) > 0.0:
         text = (
-            f"FILLETS ARE LEFT OUT, of about {1e3 * radius:.2g} mm, {hidden:.1%} of the target, "
+            f"FILLETS ARE LEFT OUT, of about {1e3 * radius:.2g} mm, {left_out:.1%} of the target, "
             f"such as at {place} in the chamber: they are where parts fail: take balls of less "
             f"than {2e3 * radius:.2g} mm (--ball-mm), or agree on it"
         )
-    reasons = {**made.reasons, "part.target.reachable": text}
-    tables = {**made.tables, "part.target": target}
-    return checked(tables, reasons, floor, made.known, made.mesh, shop)
+    return replace(narrowed, reasons={**narrowed.reasons, "part.target.reachable": text})
 
 
 def _narrow_fillets(made: Proposal, left: np.ndarray) -> float:

@@ -30,7 +30,7 @@ AS_GOOD = 0.05  # share of the target's area within which two sizes serve alike
 LEAST_FILLETS, MISSED_FILLETS = 0.005, 0.1
 # Share of the target that balls serve which an intensity takes, by heart: what geometry tells
 # is sure, and an intensity that is not calibrated is known to a factor of 2.5.
-MOSTLY = 0.9
+MOSTLY = 0.85
 # Balls in the charge: of sizes that need more, the largest is taken that serves as well. Thousands
 # of small balls make weak dents, are hard to get back from a chamber, and are slow to simulate.
 MANY = 3000

@@ -108,8 +108,9 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
     box = box_beyond(mesh, axis, not is_top, cut)
     keys = {**target.keys, "box_mm": box, "cut": True}
     reason = (
-        f"{target.reason}; AN END IS LEFT BARE, {share:.0%} of its length, to hold it by: accept "
-        "it, or peen it in a second setup, end for end"
+        f"{target.reason}; AN END IS LEFT BARE, {share:.0%} of its length, to hold it by, in a "
+        "soft lining where it is a finished seat: accept it, or peen it in a second setup, end for "
+        "end"
     )
     left = Target(keys, target.triangles & ~of_end, reason)
     points = np.eye(3)[axis] * (1.0 if is_top else -1.0)

@@ -35,6 +35,7 @@ STEEPEST = 30.0  # degrees: walls that lean more throw the balls up rather than 
 FARTHER = 1.5  # factor by which the sonotrode's distance may grow, so that walls lean less
 WIDEST = 25e-3  # m: how far a leaning wall may move out up to the ceiling
 HELD = 1e-9  # m: a floor that must move in by no more lies within a face
+LEAST_ROOM = 4.0  # ball diameters beside the part that save a sonotrode
 WHOLE = 1.25  # a face up to so much larger than the wanted floor becomes the whole floor
 
 
@@ -73,16 +74,19 @@ class Floor(NamedTuple):
         return math.isinf(self.lean), count, self.lean, self.too_large
 
 
-def floor_on_sonotrode(sizes: Sizes, round_part: float, shop: Shop, may_exceed: bool) -> Floor:
+def floor_on_sonotrode(
+    sizes: Sizes, round_part: float, shop: Shop, may_exceed: bool, ball: float = math.inf
+) -> Floor:
     """Return the sizes of a chamber that stands on the most suitable sonotrode of a shop.
 
     It is the smallest that holds the wanted floor, else the one on which the walls lean least, else
-    the fewest blocks side by side that hold it.
+    the fewest blocks side by side that hold it, for which there may be less room beside the part.
 
     Args:
         sizes: the wanted sizes.
         round_part: radius about the chamber's axis that a conformal chamber needs [m].
         may_exceed: True if a floor larger than all sonotrodes may be proposed.
+        ball: diameter of the balls, LEAST_ROOM of which are enough beside the part [m].
     Raises:
         InputError: the shop has no sonotrode for it.
     """
@@ -105,7 +109,8 @@ def floor_on_sonotrode(sizes: Sizes, round_part: float, shop: Shop, may_exceed: 
         height = sizes.height + far - sizes.distance
         return _leaning(replace(sizes, distance=far, height=height), move, angle, face)
     floors = [(one.area_mm2, _move(sizes, round_part, one), one) for one in shop.floors_of_blocks()]
-    if near := [one for one in floors if one[1] <= max(tighter, HELD)]:
+    closer = 0.0 if is_given else sizes.gap - LEAST_ROOM * ball
+    if near := [one for one in floors if one[1] <= max(tighter, closer, HELD)]:
         _, out, face = min(near, key=lambda one: one[0])
         return _over_the_face(_tight(sizes, out, face) if out > HELD else sizes, shop, face)
     sides = _sides(sizes, round_part)

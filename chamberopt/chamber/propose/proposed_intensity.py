@@ -210,7 +210,8 @@ def beside_larger(
     now, then = setting_of(made), setting_of(other)
     both = fit_sizes(made.chamber.part, [1e-3 * now.ball_mm, 1e-3 * then.ball_mm])
     here, there = (
-        f"{_about(pilot)}, {fit.served:.0%} of the target served, {pilot.in_words}"
+        f"{_about(pilot)}, {fit.touched:.0%} of the target touched, {fit.served:.0%} served, "
+        f"{pilot.in_words}"
         for pilot, fit in zip((found, told), both, strict=True)
     )
     text = (
@@ -231,10 +232,10 @@ def usual_for(made: Proposal) -> WantedIntensity:
 
     Raises InputError if none is.
     """
-    metal, middle = alloy(made.tables["materials"]["part"]), _depth(made, 0.5)
-    found = usual_intensity(metal, middle)
+    metal, thickness = alloy(made.tables["materials"]["part"]), _thickness(made)
+    found = usual_intensity(metal, thickness)
     if found is None:
-        raise InputError(f"--intensity: given usual, but {why_none(metal, middle)}")
+        raise InputError(f"--intensity: given usual, but {why_none(metal, thickness)}")
     return found
 
 
@@ -244,14 +245,21 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
     Args:
         predicted: by a pilot; None if it is not known.
     """
-    metal, middle = alloy(made.tables["materials"]["part"]), _depth(made, 0.5)
+    metal, thickness = alloy(made.tables["materials"]["part"]), _thickness(made)
     expected = "not known: the pilot left hardly a dent"
     if predicted is not None:
         expected = f"expected {_with_strip(predicted)}"
-    usual = usual_intensity(metal, middle)
-    beside = f"NO USUAL INTENSITY: {why_none(metal, middle)}"
+    usual = usual_intensity(metal, thickness)
+    beside = f"NO USUAL INTENSITY: {why_none(metal, thickness)}"
     if usual is not None:
         beside = f"{usual.low:g}-{usual.high:g}A are {usual.text}; to aim at it: --intensity usual"
+        if predicted is not None and usual.off(predicted.value):
+            beside = (
+                f"OUTSIDE THE USUAL RANGE, {usual.low:g}-{usual.high:g}A, {usual.text}: agree on "
+                "it, or aim at it: --intensity usual"
+            )
+        elif predicted is not None and not usual.low <= predicted.value <= usual.high:
+            beside += ", though nothing but strips tells so small a difference"
     return replace(made, reasons={**made.reasons, INTENSITY: f"{expected}; {beside}"})
 
 
@@ -263,7 +271,7 @@ def with_thin_places(made: Proposal) -> Proposal:
     text = (
         f"THIN PLACES: {THIN_SHARE:.0%} of the target has {plain(1e3 * thin, 2)} mm of metal or "
         f"less under it, for which balls of at most {plain(1e3 * OF_THIN * thin, 2)} mm are "
-        "proposed (by heart): agree on its intensity, or mask its edges"
+        "proposed (a rule of thumb): agree on its intensity, or mask its edges"
     )
     reason = f"{made.reasons['shot.diameter_mm']}; {text}"
     return replace(made, reasons={**made.reasons, "shot.diameter_mm": reason})
@@ -271,7 +279,7 @@ def with_thin_places(made: Proposal) -> Proposal:
 
 def is_off(made: Proposal, predicted: PredictedIntensity | None) -> bool:
     """Return whether the expected intensity lies outside of the usual range, if there is one."""
-    usual = usual_intensity(alloy(made.tables["materials"]["part"]), _depth(made, 0.5))
+    usual = usual_intensity(alloy(made.tables["materials"]["part"]), _thickness(made))
     return usual is not None and predicted is not None and usual.off(predicted.value) != 0.0
 
 
@@ -296,6 +304,15 @@ def _with_strip(predicted: PredictedIntensity) -> str:
     return f"{plain(predicted.value, 2)} mmA{factor}{of_n if predicted.value < ON_N else ''}"
 
 
+def _thickness(made: Proposal) -> float:
+    """Return the thickness [m] by which an intensity is usual for a proposal's target.
+
+    It is that of the middle of its area, unless a quarter of it is too thin for any usual one.
+    """
+    thin = _depth(made, 0.25)
+    return thin if 1e3 * thin < THIN_MM else _depth(made, 0.5)
+
+
 def _depth(made: Proposal, share: float) -> float:
     """Return the depth of material [m] than which a share of a proposal's target has less."""
     part = made.chamber.part
@@ -308,7 +325,9 @@ def _with_prediction(
     """Return a proposal with its wanted intensity, and in the reason the predicted one."""
     found = Comparison.with_prediction((wanted.low, wanted.high), predicted)
     text = f"predicted {found.predicted}; aimed at {wanted.low:g}-{wanted.high:g}A, {wanted.text}"
-    text += f"; {found.in_words}{more}"
+    if not wanted.off(predicted.value):
+        text += f"; {found.in_words}"
+    text += more
     reasons = {**made.reasons, INTENSITY: text}
     ends = {"intensity_mmA": [wanted.low, wanted.high]}
     tables = {**made.tables, "process": {**made.tables["process"], **ends}}

@@ -193,6 +193,19 @@ def test_the_ranges_are_those_of_the_table_in_inches(
     assert usual_intensity(metal, math.inf) is not None
 
 
+def test_near_the_step_of_the_table_both_ranges_are_told() -> None:
+    told = {
+        share: usual_intensity(metal, share * 1e-3 * THICK_MM).text  # type: ignore[union-attr]
+        for metal in (ALUMINIUM,)
+        for share in (0.9, 0.99, 1.01, 1.1)
+    }
+    assert ["(0.25-0.36A above 9.52 mm)" in told[share] for share in told] == [0, 1, 0, 0]
+    assert ["(0.15-0.25A up to 9.52 mm)" in told[share] for share in told] == [0, 0, 1, 0]
+    same = usual_intensity(TITANIUM, 1e-3 * THICK_MM)
+    assert same is not None
+    assert "9.52 mm)" not in same.text
+
+
 def test_a_range_of_the_table_reads_as_if_it_were_given() -> None:
     found = usual_intensity(TITANIUM, 5e-3)
     assert found is not None

@@ -16,7 +16,7 @@ from chamberopt.chamber.propose.proposed_end import held_end
 from chamberopt.chamber.propose.proposed_holder import HolderChoice, end_holder, holder_choices
 from chamberopt.chamber.propose.proposed_mask import find_left_out
 from chamberopt.chamber.propose.proposed_target import WHOLE, Surface, Target
-from chamberopt.chamber.propose.text import design_text
+from chamberopt.chamber.propose.text import clauses, design_text
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
 
@@ -156,6 +156,36 @@ def test_a_leaf_is_held_by_an_end_left_out_of_its_target(tmp_path: Path) -> None
     assert made.design.holder.grip_mm is not None
     assert "to hold it by" in made.reasons["part.target"]
     assert made.design.part.target.box_mm is not None
+
+
+def test_the_room_is_told_wall_by_wall(tmp_path: Path) -> None:
+    """What is told beside a block is what its box and its sizes in the chamber give."""
+    trimesh.creation.box((60, 40, 20)).export(tmp_path / "block.stl")
+    made = propose(tmp_path / "block.stl", Wanted("mm", shape="box"), lambda _: [])
+    long, wide = (made.tables["chamber"][key] for key in ("length_mm", "width_mm"))
+    sizes = np.ptp(1e3 * made.chamber.part.vertices, axis=0)
+    x, y = (f"{0.5 * (one - own):.3g} mm" for one, own in ((long, sizes[0]), (wide, sizes[1])))
+    told = made.reasons["chamber.length_mm"]
+    assert told.startswith(f"leaves {x} at -x, {x} at +x, {y} at -y, {y} at +y beside the part;")
+
+
+@pytest.mark.parametrize(
+    ("metal", "told"),
+    [
+        ("S355", ""),
+        ("316L", ""),
+        ("Ti-6Al-4V", ""),
+        ("51CrV4", "it decides which intensity is usual"),
+        ("16MnCr5", "it decides the balls"),
+    ],
+)
+def test_a_hardness_that_a_name_does_not_tell_is_to_be_settled(
+    tmp_path: Path, metal: str, told: str
+) -> None:
+    trimesh.creation.box((30, 20, 10)).export(tmp_path / "block.stl")
+    made = propose(tmp_path / "block.stl", Wanted("mm", alloy=metal), lambda _: [])
+    settle = clauses(made.reasons["materials.part"])[1]
+    assert [told in one for one in settle] == [True] * bool(told)
 
 
 def test_a_part_that_is_all_target_is_held_by_its_slimmer_end() -> None:

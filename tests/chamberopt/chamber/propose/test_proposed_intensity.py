@@ -328,7 +328,11 @@ def test_without_a_wish_the_expected_intensity_stands_beside_the_usual_one(
     assert "not known" in with_expected_intensity(made, None).reasons[INTENSITY]
     predicted = PredictedIntensity(0.31, 0.05, 1.9, 2.5)
     told = with_expected_intensity(made, predicted).reasons[INTENSITY]
-    assert "expected 0.31 mmA x/÷ 2.5; 0.15-0.25A are usual for titanium of 8 mm" in told
+    assert "expected 0.31 mmA x/÷ 2.5; OUTSIDE THE USUAL RANGE, 0.15-0.25A, usual for tit" in told
+    for value, beside in ((0.2, False), (0.26, True)):
+        near = with_expected_intensity(made, PredictedIntensity(value, 0.05, 1.9, 2.5))
+        assert "0.15-0.25A are usual for titanium of 8 mm" in near.reasons[INTENSITY]
+        assert ("nothing but strips tells" in near.reasons[INTENSITY]) is beside
     assert "THIN" not in told
     wanted = usual_for(made)
     assert (wanted.low, wanted.high) == (0.15, 0.25)
@@ -377,6 +381,18 @@ def test_thin_places_are_told_of_every_metal(tmp_path: Path, shop: Shop, metal: 
         assert ("THIN PLACES: 5% of the target has 1.5 mm of metal or less" in told) is is_thin
 
 
+def test_where_a_quarter_is_too_thin_no_intensity_is_usual(tmp_path: Path, shop: Shop) -> None:
+    """A plate of 8 mm of which a part goes on as a sheet of 1.5 mm: more than half is thick."""
+    sheet = trimesh.creation.box(bounds=[[39, 0, 0], [70, 40, 1.5]])
+    plate = trimesh.creation.box(bounds=[[0, 0, 0], [40, 40, 8]])
+    trimesh.boolean.union([plate, sheet]).export(tmp_path / "step.stl")
+    wanted = Wanted("mm", shop=shop, alloy="Ti-6Al-4V")
+    made = propose(tmp_path / "step.stl", wanted, lambda known: [one.name for one in known])
+    with pytest.raises(InputError, match=r"much of the target is 1\.5 mm"):
+        usual_for(made)
+    assert not is_off(made, PredictedIntensity(0.5, 0.05, 1.9, 2.5))
+
+
 def pilot_of(intensity: float, seconds: float) -> Measured:
     """What a pilot says of a design with an intensity [mmA] and a time to 98 % [s]."""
     predicted = PredictedIntensity.estimated(Estimate(intensity / 13.5e-3, 0.0))
@@ -409,7 +425,8 @@ def test_where_balls_are_too_weak_the_next_larger_ones_are_told_beside_them(
     assert told.design == made.design
     text = told.reasons[INTENSITY]
     assert "WITH LARGER BALLS, 2 mm at 40 µm: about 0.12 mmA, " in text
-    assert "of the target served, 98 % after about 100 s, beside about 0.05 mmA, " in text
+    assert "% of the target touched, " in text
+    assert "% served, 98 % after about 100 s, beside about 0.05 mmA, " in text
     assert text.endswith(", and both, one after the other, do not pay: they jam")
     for enough in (pilot_of(0.12, 600.0), pilot_of(0.2, 600.0), None):
         assert larger_balls(made, wanted, asked, enough, again, measure) is None

@@ -132,6 +132,16 @@ def test_a_floor_is_made_narrower_where_that_saves_blocks() -> None:
     assert found.sizes.gap == pytest.approx(0.01 - 3e-3 + 0.0)
 
 
+@pytest.mark.parametrize(("ball", "count"), [(2e-3, 2), (3e-3, 3)])
+def test_less_room_that_is_four_balls_wide_saves_a_sonotrode(ball: float, count: int) -> None:
+    """Two blocks are 120 mm long, so 10 of the 20 mm at each end of the part go."""
+    own = shop({**SQUARE, "size_mm": [60.0, 56.0]})
+    sizes = Sizes("box", {"length_mm": 140.0, "width_mm": 55.0}, 0.015, 0.05, 0.02, False, 0.03)
+    found = floor_on_sonotrode(sizes, 0.02, own, False, ball)
+    assert found.blocks is not None
+    assert found.blocks.count == count
+
+
 def test_what_no_sonotrode_holds_is_refused_with_a_way_out() -> None:
     with pytest.raises(InputError, match=r"floor of 190 x 96 mm is larger than the largest.*strip"):
         floor({"length_mm": 190.0, "width_mm": 96.0}, "box", shop(DISC, BLOCK))
