@@ -29,7 +29,7 @@ from chamberopt.documents.comparison import comparison_end
 from chamberopt.documents.report import answer_section
 from chamberopt.documents.study import aim_in_words
 from chamberopt.documents.wording import value_text
-from chamberopt.page.answers import part_answer, shape_answer, step_texts, surface_answer
+from chamberopt.page.answers import packed, part_answer, shape_answer, step_texts, surface_answer
 from chamberopt.page.checker import Checker
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
@@ -200,12 +200,14 @@ class Acts:
     def reach(self, asked: Any) -> bytes:
         return self._checker.reach(int(asked["number"]))
 
+    def faces(self, asked: Any) -> bytes:
+        """Return the number of the face to which each triangle of the part belongs."""
+        mesh = preview_part(self._file(asked).design).mesh
+        return packed({}, face=self._picker.faces(mesh, _crease(asked)).of_triangle)
+
     def pick(self, asked: Any) -> dict[str, object]:
         design = self._file(asked).with_changes(asked["changes"])
-        triangle, crease_deg = int(asked["triangle"]), asked["crease_deg"]
-        crease = None if crease_deg is None else float(crease_deg)
-        if crease is not None and not 0.1 <= crease <= 180.0:
-            raise InputError(f"crease angle: given {crease:g}; allowed: from 0.1 to 180 degrees")
+        triangle, crease = int(asked["triangle"]), _crease(asked)
         if asked["act"] == "down":
             return self._picker.face_down(design, triangle, crease)
         alike, add = bool(asked["alike"]), asked["act"] == "add"
@@ -380,6 +382,14 @@ class Acts:
         """Return the first new or empty folder of results/NAME, results/NAME-2 and so on."""
         self.inside("results")  # the folder may be a link to elsewhere
         return free_folder(self._path.parent, Path("results", name))
+
+
+def _crease(asked: Any) -> float | None:
+    """Return the crease angle [degrees] that a page gives; None for the faces of a CAD file."""
+    crease = None if asked["crease_deg"] is None else float(asked["crease_deg"])
+    if crease is not None and not 0.1 <= crease <= 180.0:
+        raise InputError(f"crease angle: given {crease:g}; allowed: from 0.1 to 180 degrees")
+    return crease
 
 
 def _told_of(file: EditedFile) -> dict[str, object]:

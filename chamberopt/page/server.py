@@ -134,7 +134,7 @@ OF_FRONT = "look", "view", "face", "chamber", "propose", "open", "close", "stop"
 LOOKS_OF_FRONT = "front", "status"
 OF_DESIGN = (
     "read", "part", "surface", "fields", "structure", "step", "remove", "shape", "cavity", "reach",
-    "pick", "save", "study", "start", "shown", "candidates", "candidate", "model", "resume", "more",
+    "faces", "pick", "save", "study", "start", "shown", "candidates", "candidate", "model", "resume", "more",
 )  # fmt: skip
 LOOKS_OF_DESIGN = ("results",)
 CLOSED = "no design is open here any more: reload the page"

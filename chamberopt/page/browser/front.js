@@ -37,13 +37,13 @@ async function open(design) {
   location.reload();
 }
 
-const view = new View3D(find("view"));
+const view = new View3D(find("view")), tools = new Tools([view], find("tools"));
 let drawnPart = "", pointed = "", seen = null;
 const CHAMBER = ["walls", "sonotrode", "edges"];
 
 // Draw the part beside its size, where the names of its surfaces are pointed at.
 async function draw(part) {
-  find("place").append(find("view"));
+  find("place").append(find("seen"));
   find("place").hidden = !part;
   if (part === drawnPart && !view.get("walls")) return;
   for (const name of ["part", ...CHAMBER]) view.remove(name);
@@ -52,7 +52,7 @@ async function draw(part) {
   const told = unpack(await ask("/view", { part, unit: known.unit }));
   if (part !== drawnPart) return;
   seen = told;
-  view.kinds = seen.kinds;
+  tools.legend(find("legend"), seen.kinds);
   pointed = seen.pointed;
   view.surface("part", { points: seen.points, triangles: seen.triangles, kind: "rest", open: !seen.closed });
   lookAt(view.extent());
@@ -66,14 +66,14 @@ function lookAt({ low, high }, way = [0.49, -0.79, 0.35]) {
 
 // Put the part into the chamber that is proposed, as far as it is known, in the place of the picture until there is one.
 async function drawChamber(hasPicture) {
-  (hasPicture ? find("of-choices") : find("place-of-draft")).prepend(find("view"));
+  (hasPicture ? find("of-choices") : find("place-of-draft")).prepend(find("seen"));
   const answer = unpack(await ask("/chamber", {}));
   if (!seen || answer.state.length !== seen.triangles.length / 3) return; // of another part
   view.pose("part", answer.rotation, answer.shift);
   view.colourTriangles("part", coloursOf(seen, answer.state));
   view.surface("walls", { points: answer.points, triangles: answer.walls, kind: "wall", opacity: 0.16 });
   view.surface("sonotrode", { points: answer.points.slice(), triangles: answer.sonotrode, kind: "sonotrode", opacity: 0.6 });
-  view.lines("edges", answer.edges, seen.edges);
+  view.lines("edges", answer.edges, seen.edges, "wall");
   const [low, high] = answer.shape_mm;
   const box = { low: low.map((x, i) => Math.min(x, answer.part_mm[0][i])), high: high.map((x, i) => Math.max(x, answer.part_mm[1][i])) };
   lookAt(box, wayToTarget(view.get("part"), answer));
