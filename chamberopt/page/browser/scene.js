@@ -1,6 +1,6 @@
 // The view: part and chamber as the newest answers have them, and handles that turn and move the part.
 import { change, endMove, unpack, value } from "./state.js";
-import { coloursOf, wayToTarget } from "./surfaces.js";
+import { colourByState, wayToTarget } from "./surfaces.js";
 
 const CLEAR = 0.16, FACE = 0.6; // opacity of walls and sonotrode
 const BODIES = ["deflectors", "holder", "mask"]; // that not every chamber has
@@ -48,8 +48,7 @@ function colour(name, state) {
   const mesh = view.get(name);
   if (coloured[0] === mesh && coloured[1].every((kind, k) => kind === state[k])) return;
   coloured = [mesh, state];
-  mesh.userData.kinds = [...new Set(state)].map((kind) => part.states[kind]);
-  view.colourTriangles(name, coloursOf(part, state));
+  colourByState(view, name, part, state);
 }
 
 function walls(answer) {
