@@ -31,6 +31,7 @@ from chamberopt.documents.study import aim_in_words
 from chamberopt.documents.wording import value_text
 from chamberopt.page.answers import packed, part_answer, shape_answer, step_texts, surface_answer
 from chamberopt.page.checker import Checker
+from chamberopt.page.duration import duration_in_words
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
 from chamberopt.page.page_words import amplitudes_named, balls_named, explained, on_page
@@ -62,14 +63,8 @@ def list_results(folder: Path) -> list[dict[str, object]]:
 
     Each has a line on its coverage, and on the numbers of its design by which the results differ.
     """
-    found: dict[Path, float] = {}
-    for depth, name in product(range(1, DEEPEST + 1), (INPUTS, RESULT)):
-        for file in folder.glob("/".join(["*"] * depth + [name])):
-            found[file.parent] = max(found.get(file.parent, 0.0), file.lstat().st_mtime)
     rows, results = [], {}
-    for where in sorted(found, key=lambda one: found[one], reverse=True):
-        if not where.resolve().is_relative_to(folder):
-            continue  # a link to elsewhere
+    for where in _result_folders(folder):
         row: dict[str, Any] = {"folder": where.relative_to(folder).as_posix()}
         row |= {name: (where / name).is_file() for name in (REPORT, SHEET)}
         row["is_study"] = is_study_folder(where)
@@ -87,6 +82,16 @@ def list_results(folder: Path) -> list[dict[str, object]]:
         row["text"] = "; ".join(filter(None, (words.get(row["folder"]), row["text"])))
         row["words"] = on_page(row["text"])
     return rows
+
+
+def _result_folders(folder: Path) -> list[Path]:
+    """Return the folders of all results and studies below a folder, the newest first."""
+    found: dict[Path, float] = {}
+    for depth, name in product(range(1, DEEPEST + 1), (INPUTS, RESULT)):
+        for file in folder.glob("/".join(["*"] * depth + [name])):
+            if file.parent.resolve().is_relative_to(folder):  # no link to elsewhere
+                found[file.parent] = max(found.get(file.parent, 0.0), file.lstat().st_mtime)
+    return sorted(found, key=lambda one: found[one], reverse=True)
 
 
 def _differences(results: Sequence[Result]) -> list[str]:
@@ -289,6 +294,12 @@ class Acts:
             arguments = [command, name, *sweeps, "--out", folder]
             shows = "" if sweeps else folder
         return self._command.start(arguments, self._path.parent, shows)
+
+    def duration(self, asked: Any) -> dict[str, object]:
+        """Return in words how long a design or study will take; "" if nothing is known of it."""
+        what = self.inside(str(asked["of"]))
+        self._refuse_shape(what)
+        return {"words": duration_in_words(what, _result_folders(self._path.parent))}
 
     def candidates(self, asked: Any) -> dict[str, object]:
         """Return the candidates of a study; only the version if the page has seen this one."""

@@ -135,7 +135,7 @@ LOOKS_OF_FRONT = "front", "status"
 OF_DESIGN = (
     "read", "part", "surface", "fields", "structure", "step", "remove", "shape", "cavity", "reach",
     "faces", "pick", "save", "study", "start", "shown", "candidates", "candidate", "model",
-    "resume", "more",
+    "resume", "more", "duration",
 )  # fmt: skip
 LOOKS_OF_DESIGN = ("results",)
 CLOSED = "no design is open here any more: reload the page"

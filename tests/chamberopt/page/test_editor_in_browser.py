@@ -351,8 +351,10 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     expect(page.locator("#of-words")).to_have_text(words)
     opened.tab("run")
     page.select_option("#of", "design.toml")
+    expect(page.locator("#lasts")).to_be_empty()  # nothing like it was simulated yet
     page.click("[data-command=simulate]")
     expect(page.locator("#progress")).to_contain_text("finished", timeout=WAIT)
+    expect(page.locator("#lasts")).to_contain_text("about 5 s")
     result = json.loads((folder / "results" / "design" / "result.json").read_text())
     out = folder / "by-command"
     assert main(["simulate", str(folder / "design.toml"), "--no-ranges", "--out", str(out)]) == 0
