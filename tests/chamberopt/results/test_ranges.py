@@ -90,7 +90,7 @@ def test_the_report_says_the_range_beside_the_interval(folder: Path) -> None:
     sections = {one.title: one for one in document.sections}
     assert sections["Coverage"].content[0].head[-1] == "range"
     figures, ends = sections["What is not calibrated"].content[1:3]
-    assert ends.head == ("", "v0, low", "v0, high")
+    assert ends.head == ("", "yield speeds, low", "yield speeds, high")
     row = dict((one[0], one) for one in figures.rows)["mean exposure, in times to 98 % coverage"]
     low, high = (float(one) for one in row[2].split(" to "))
     assert (low, high) == pytest.approx((0.5 * 2.0 * low, 4.0 * low), rel=0.1)

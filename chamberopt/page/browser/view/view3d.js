@@ -105,7 +105,9 @@ class View3D {
 
   // Colour a surface by values between 0 and 1 at its points, along a scale of colours "#rrggbb".
   paint(name, values, scale) {
-    const { mesh } = this.#meshes.get(name), uv = mesh.geometry.getAttribute("uv"), n = scale.length;
+    const mesh = this.get(name);
+    if (!mesh) return; // the view was given up before its colours came
+    const uv = mesh.geometry.getAttribute("uv"), n = scale.length;
     for (let i = 0; i < values.length; i++) uv.array[2 * i] = (0.5 + values[i] * (n - 1)) / n;
     uv.needsUpdate = true;
     if (mesh.userData.scale !== scale) {
