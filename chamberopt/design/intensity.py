@@ -185,8 +185,8 @@ class PredictedIntensity:
             plain(one, 2) for one in (self.value, self.low, self.high, self.factor)
         )
         return (
-            f"{value} mmA, within a factor of {factor} (one standard deviation, at 95 % {low} to {high} mmA): "
-            f"{UNTIL}"
+            f"{value} mmA, within a factor of {factor} (one standard deviation, at 95 % {low} to "
+            f"{high} mmA): {UNTIL}"
         )
 
 

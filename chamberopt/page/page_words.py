@@ -67,8 +67,8 @@ TERMS = {
     "replicas": "simulations of the same chamber, each from a random start of its own; how they "
     "differ gives the interval ±",
     "within a factor of": "0.1 within a factor of 2 is from 0.05 to 0.2",
-    "restitution": "rebound speed over impact speed; less above the speed that is named, from which "
-    "on the metal yields",
+    "restitution": "rebound speed over impact speed; less above the speed that is named, from "
+    "which on the metal yields",
     "most_even": "the study of the most even coverage, the largest mean less its spread",
 }
 _TABLES = (
