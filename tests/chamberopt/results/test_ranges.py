@@ -85,8 +85,8 @@ def test_the_report_says_the_range_beside_the_interval(folder: Path) -> None:
         "the target is "
     )
     assert line.endswith(
-        " %; what would narrow it most is the yield speed (100 % of it), by ball drops at 3 m/s on each surface "
-        "(chamberopt calibrate)."
+        " %; what would narrow it most is the yield speed (100 % of it), by ball drops at 3 m/s "
+        "on each surface (chamberopt calibrate)."
     )
     sections = {one.title: one for one in document.sections}
     assert sections["Coverage"].content[0].head[-1] == "range"
