@@ -56,8 +56,9 @@ def main() -> None:
     axes.axis("off")
     for number, (title, case) in enumerate(CASES.items()):
         top = page[1] - TALL * number
-        axes.text(3.0, top - 2.0, title, size=7.5, weight="bold", va="top")
+        axes.text(3.0, top - 2.0, title, size=8.0, va="top")
         draw_chamber(axes, build_chamber(held(*case)), 3.0, top - 5.0, (WIDE - 6.0, TALL - 6.0))
+    axes.text(3.0, 2.0, "lengths in mm", size=7.0, color="#56616a")
     figure.savefig(ROOT / "docs" / "images" / "holders.png")
 
 

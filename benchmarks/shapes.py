@@ -97,7 +97,7 @@ def _draw(axes: Any, cavity: ShapeSurface, part: np.ndarray) -> None:
         axes.add_collection3d(
             Poly3DCollection(triangles, facecolors=colours, edgecolors=colours, linewidths=0.3)
         )
-    axes.add_collection3d(Poly3DCollection(corners[~floor], facecolors=to_rgba(GLASS, 0.1)))
+    axes.add_collection3d(Poly3DCollection(corners[~floor], facecolors=to_rgba(GLASS, 0.25)))
     axes.add_collection3d(Line3DCollection(_edges(cavity), colors=EDGES, linewidths=0.6, alpha=0.8))
     axes.set(xlim=(-23, 23), ylim=(-23, 23), zlim=(4, 53))
     axes.set_aspect("equal")

@@ -44,7 +44,7 @@ def tell_program(name: str, known: Callable[[], Mapping[str, object]]) -> None:
         known: works it out, only where it is read.
     """
     if _json_lines and not _is_quiet:
-        print(json.dumps({name: known()}), file=sys.stderr, flush=True)
+        _write_json({name: known()}, sys.stderr)
 
 
 @contextmanager
@@ -81,7 +81,7 @@ def step(
         try:
             yield write
         finally:
-            print(json.dumps({"step": what, "ended": True}), file=stream, flush=True)
+            _write_json({"step": what, "ended": True}, stream)
         return
     if not _displays and not stream.isatty() and not _is_notebook():
         yield _log_lines(what, stream)
@@ -158,9 +158,15 @@ def _json_writer(what: str, stream: TextIO) -> Progress:
         if time.monotonic() >= due or done == total:
             due = time.monotonic() + LEAST_PAUSE
             found = {"step": what, "done": round(done, 2), "total": total, "best": best}
-            print(json.dumps(found), file=stream, flush=True)
+            _write_json(found, stream)
 
     return write
+
+
+def _write_json(found: Mapping[str, object], stream: TextIO) -> None:
+    """Write a line of JSON in one piece, as steps of several threads write to one stream."""
+    stream.write(f"{json.dumps(found)}\n")
+    stream.flush()
 
 
 def _log_lines(what: str, stream: TextIO) -> Progress:
@@ -170,7 +176,8 @@ def _log_lines(what: str, stream: TextIO) -> Progress:
     def write(done: float, total: int, best: float | None) -> None:
         nonlocal due, first
         now = time.monotonic()
-        first = first or (now, done)  # earlier work, such as compiling, is not counted
+        if first is None or done < first[1]:  # or what is counted has begun anew
+            first = now, done  # earlier work, such as compiling, is not counted
         if now < due or not first[1] < done < total:
             return
         due = now + (now - begun)

@@ -179,15 +179,15 @@ class PredictedIntensity:
 
     @property
     def in_words(self) -> str:
-        """The value with its band, as "0.18 mmA, x/÷ 2.5 (...)"."""
+        """The value with its band, as "0.18 mmA, within a factor of 2.5 (...)"."""
         if self.factor == 1.0:
             return with_interval(self.value, self.high - self.value, "mmA")
         value, low, high, factor = (
             plain(one, 2) for one in (self.value, self.low, self.high, self.factor)
         )
         return (
-            f"{value} mmA, x/÷ {factor} (one standard deviation, at 95 % {low} to {high} mmA): "
-            f"{UNTIL}"
+            f"{value} mmA, within a factor of {factor} (one standard deviation, at 95 % {low} to "
+            f"{high} mmA): {UNTIL}"
         )
 
 

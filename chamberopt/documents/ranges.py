@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from chamberopt.peening.range_result import RangedFigure, RangeResult, RivalAtEnds
     from chamberopt.results.load import Result
 
-WORDS = {"friction": "friction", "v0": "v0", "slopes": "slopes of the faces"}
+WORDS = {"friction": "friction", "v0": "the yield speed", "slopes": "slopes of the faces"}
 MEASURED_BY = {
     "friction": "the rate of impacts on the part (chamberopt calibrate)",
     "v0": "ball drops at 3 m/s on each surface (chamberopt calibrate)",
@@ -173,7 +173,7 @@ def slow_end_is_late(result: Result) -> bool:
 
 
 def groups_text(found: RangeResult) -> str:
-    """Return the names of what is not calibrated, such as "friction and v0"."""
+    """Return the names of what is not calibrated, such as "friction and the yield speed"."""
     return _list(found.groups)
 
 

@@ -553,7 +553,7 @@ def _checks(result: Result) -> Iterator[Row]:
         rough = PredictedIntensity.of(result.metrics, calibration)
         known = "not known before"
         if rough is not None and design.process.intensity_mmA is not None:
-            known = f"{plain(rough.value, 2)} mmA, x/÷ {plain(rough.factor, 2)}"
+            known = f"{plain(rough.value, 2)} mmA, within a factor of {plain(rough.factor, 2)}"
         yield strips, f"{known}: calibrates to mmA"
     else:
         text = metric_label("almen_intensity").format(intensity)

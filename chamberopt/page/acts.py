@@ -29,8 +29,9 @@ from chamberopt.documents.comparison import comparison_end
 from chamberopt.documents.report import answer_section
 from chamberopt.documents.study import aim_in_words
 from chamberopt.documents.wording import value_text
-from chamberopt.page.answers import part_answer, shape_answer, step_texts, surface_answer
+from chamberopt.page.answers import packed, part_answer, shape_answer, step_texts, surface_answer
 from chamberopt.page.checker import Checker
+from chamberopt.page.duration import duration_in_words
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
 from chamberopt.page.page_words import amplitudes_named, balls_named, explained, on_page
@@ -62,14 +63,8 @@ def list_results(folder: Path) -> list[dict[str, object]]:
 
     Each has a line on its coverage, and on the numbers of its design by which the results differ.
     """
-    found: dict[Path, float] = {}
-    for depth, name in product(range(1, DEEPEST + 1), (INPUTS, RESULT)):
-        for file in folder.glob("/".join(["*"] * depth + [name])):
-            found[file.parent] = max(found.get(file.parent, 0.0), file.lstat().st_mtime)
     rows, results = [], {}
-    for where in sorted(found, key=lambda one: found[one], reverse=True):
-        if not where.resolve().is_relative_to(folder):
-            continue  # a link to elsewhere
+    for where in _result_folders(folder):
         row: dict[str, Any] = {"folder": where.relative_to(folder).as_posix()}
         row |= {name: (where / name).is_file() for name in (REPORT, SHEET)}
         row["is_study"] = is_study_folder(where)
@@ -87,6 +82,16 @@ def list_results(folder: Path) -> list[dict[str, object]]:
         row["text"] = "; ".join(filter(None, (words.get(row["folder"]), row["text"])))
         row["words"] = on_page(row["text"])
     return rows
+
+
+def _result_folders(folder: Path) -> list[Path]:
+    """Return the folders of all results and studies below a folder, the newest first."""
+    found: dict[Path, float] = {}
+    for depth, name in product(range(1, DEEPEST + 1), (INPUTS, RESULT)):
+        for file in folder.glob("/".join(["*"] * depth + [name])):
+            if file.parent.resolve().is_relative_to(folder):  # no link to elsewhere
+                found[file.parent] = max(found.get(file.parent, 0.0), file.lstat().st_mtime)
+    return sorted(found, key=lambda one: found[one], reverse=True)
 
 
 def _differences(results: Sequence[Result]) -> list[str]:
@@ -200,12 +205,14 @@ class Acts:
     def reach(self, asked: Any) -> bytes:
         return self._checker.reach(int(asked["number"]))
 
+    def faces(self, asked: Any) -> bytes:
+        """Return the number of the face to which each triangle of the part belongs."""
+        mesh = preview_part(self._file(asked).design).mesh
+        return packed({}, face=self._picker.faces(mesh, _crease(asked)).of_triangle)
+
     def pick(self, asked: Any) -> dict[str, object]:
         design = self._file(asked).with_changes(asked["changes"])
-        triangle, crease_deg = int(asked["triangle"]), asked["crease_deg"]
-        crease = None if crease_deg is None else float(crease_deg)
-        if crease is not None and not 0.1 <= crease <= 180.0:
-            raise InputError(f"crease angle: given {crease:g}; allowed: from 0.1 to 180 degrees")
+        triangle, crease = int(asked["triangle"]), _crease(asked)
         if asked["act"] == "down":
             return self._picker.face_down(design, triangle, crease)
         alike, add = bool(asked["alike"]), asked["act"] == "add"
@@ -287,6 +294,12 @@ class Acts:
             arguments = [command, name, *sweeps, "--out", folder]
             shows = "" if sweeps else folder
         return self._command.start(arguments, self._path.parent, shows)
+
+    def duration(self, asked: Any) -> dict[str, object]:
+        """Return in words how long a design or study will take; "" if nothing is known of it."""
+        what = self.inside(str(asked["of"]))
+        self._refuse_shape(what)
+        return {"words": duration_in_words(what, _result_folders(self._path.parent))}
 
     def candidates(self, asked: Any) -> dict[str, object]:
         """Return the candidates of a study; only the version if the page has seen this one."""
@@ -380,6 +393,14 @@ class Acts:
         """Return the first new or empty folder of results/NAME, results/NAME-2 and so on."""
         self.inside("results")  # the folder may be a link to elsewhere
         return free_folder(self._path.parent, Path("results", name))
+
+
+def _crease(asked: Any) -> float | None:
+    """Return the crease angle [degrees] that a page gives; None for the faces of a CAD file."""
+    crease = None if asked["crease_deg"] is None else float(asked["crease_deg"])
+    if crease is not None and not 0.1 <= crease <= 180.0:
+        raise InputError(f"crease angle: given {crease:g}; allowed: from 0.1 to 180 degrees")
+    return crease
 
 
 def _told_of(file: EditedFile) -> dict[str, object]:

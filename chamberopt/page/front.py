@@ -13,7 +13,8 @@ from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.propose.proposed_target import SHAPES, named_surfaces
 from chamberopt.chamber.propose.shop import load_shop
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import check_new_file, read_file, write_bytes
+from chamberopt.common.files import check_new_file, read_file, remove_file, write_bytes
+from chamberopt.common.shipped import shipped_files
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.calibration import Calibration
 from chamberopt.design.design import Design, validate
@@ -32,6 +33,7 @@ from chamberopt.workflows.propose import DESIGN, PICTURE, Wishes
 
 PART_NAME = re.compile(r"\w[\w .,()+-]{0,150}")
 PROPOSING = "chamberopt new "  # begins a command that proposes a design
+EXAMPLE = "fir_tree.step"  # of the shipped parts: with a unit, and names of its surfaces
 MOST_NAMES = 40  # names of a part's surfaces that the page lists
 
 
@@ -110,7 +112,10 @@ class Front:
         }
 
     def upload(self, name: str, content: bytes) -> dict[str, object]:
-        """Write a part's file into the folder, unless it is there, and no other of this name is."""
+        """Write a part's file into the folder, unless it is there, and no other of this name is.
+
+        A file that cannot be read as a part does not stay.
+        """
         if not is_mesh_name(name) or not PART_NAME.fullmatch(name):
             raise InputError(f"{name}: not a part that can be read: {', '.join(SUFFIXES)}")
         path = self._folder / name
@@ -119,7 +124,18 @@ class Front:
         if path.exists():
             raise InputError(f"{name} is in {self._folder} already: choose it, or rename yours")
         write_bytes(check_new_file(path), content)
+        try:
+            self._part_of_any_unit({"part": name, "unit": ""})
+        except InputError:
+            remove_file(path)
+            raise
         return {"part": name}
+
+    def example(self, _: object) -> dict[str, object]:
+        """Write a part that comes with the program into the folder, unless it is there."""
+        return self.upload(
+            EXAMPLE, read_file(shipped_files() / "designs/parts" / EXAMPLE, follow=True)
+        )
 
     def look(self, asked: Any) -> dict[str, object]:
         """Return a part's size and its surfaces' names and areas; its possible sizes by unit.

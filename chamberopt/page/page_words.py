@@ -1,4 +1,4 @@
-"""Words of the page for keys of files, options of the command line and choices.
+"""Words of the page for keys of files, commands and options of the command line, and choices.
 
 What the page shows of a message is a list of texts, in which a key, option or term is a pair: its
 words, and a tip. The tip says what a key is in a file or on the command line, or what a term means.
@@ -42,6 +42,18 @@ OPTIONS = {
     "no-pilot": "the choice not to simulate",
 }
 KEYS = {"holder.at": "faces of the holder", "mask.at": "faces of the mask"}
+# What the page has in the place of a command, or what the command is for where the page lacks it.
+COMMANDS = {
+    "chamberopt simulate": "Simulate, in the tab Run",
+    "simulate --tolerances": "a simulation with tolerances, in a terminal",
+    "chamberopt run": "Run the search, in the tab Run",
+    "chamberopt check": "what this page says at its right",
+    "chamberopt check --pilot": "a check with pilot runs, in a terminal",
+    "chamberopt calibrate": "a calibration of the machine, in a terminal",
+    "chamberopt materials": "the catalogue of materials",
+    "chamberopt shop --example": "the example of a shop's file",
+    "simulate it with --tolerances": "simulate it with tolerances, in a terminal",
+}
 # Terms that not every reader knows, and what they mean (docs/reference/glossary.md).
 TERMS = {
     "uniform coverage": "mean coverage of the target less its standard deviation: high where the "
@@ -54,7 +66,9 @@ TERMS = {
     "not resolved": "too few dents were simulated to tell: simulate longer",
     "replicas": "simulations of the same chamber, each from a random start of its own; how they "
     "differ gives the interval ±",
-    "x/÷": "times or divided by: 0.1 x/÷ 2 is from 0.05 to 0.2",
+    "within a factor of": "0.1 within a factor of 2 is from 0.05 to 0.2",
+    "restitution": "rebound speed over impact speed; less above the speed that is named, from "
+    "which on the metal yields",
     "most_even": "the study of the most even coverage, the largest mean less its spread",
 }
 _TABLES = (
@@ -63,8 +77,9 @@ _TABLES = (
 )
 _DOTTED = rf"(?:{_TABLES})(?:\.\w+)+"
 _GUIDE = r"docs/[\w/]+\.md(?:#[\w-]+)?"
+_COMMAND = "|".join(sorted(map(re.escape, COMMANDS), key=len, reverse=True))
 _KEY = re.compile(
-    rf"{_GUIDE}|\[(?:{_TABLES})\]|\[{_DOTTED}\]|(?<![\w./]){_DOTTED}|--(?:{'|'.join(OPTIONS)})(?![\w-])"
+    rf"{_GUIDE}|(?:{_COMMAND})(?![\w-])|\[(?:{_TABLES})\]|\[{_DOTTED}\]|(?<![\w./]){_DOTTED}|--(?:{'|'.join(OPTIONS)})(?![\w-])"
 )
 _TERM = re.compile(rf"(?<![\w./])(?:{'|'.join(map(re.escape, TERMS))})(?![\w./])")
 _FILES = (".toml", ".json", ".html", ".pdf", ".png", *SUFFIXES)  # "part.stl" is no key
@@ -73,7 +88,8 @@ _FILES = (".toml", ".json", ".html", ".pdf", ".png", *SUFFIXES)  # "part.stl" is
 def on_page(text: str) -> Words:
     """Return a message of the program with its keys and options in the words of the page.
 
-    A term has its meaning where it stands first.
+    A command is named by what the page has in its place. A term has its meaning where it stands
+    first.
 
     >>> on_page("raise chamber.height_mm")
     ['raise ', ('height of the chamber', 'chamber.height_mm')]
@@ -94,7 +110,7 @@ def on_page(text: str) -> Words:
         if found.lower().endswith(_FILES):
             continue
         key = found.strip("[]").removeprefix("effects.")
-        words = OPTIONS.get(found[2:]) or KEYS.get(key) or inner_first(key)
+        words = COMMANDS.get(found) or OPTIONS.get(found[2:]) or KEYS.get(key) or inner_first(key)
         words = "guide" if found.startswith("docs/") else words
         made += [text[at : match.start()]] * (match.start() > at)
         made.append((words, found))

@@ -58,7 +58,7 @@ class Picker:
                 faces.
         """
         preview = preview_part(design)
-        mesh, faces = preview.mesh, self._faces(preview.mesh, crease_deg)
+        mesh, faces = preview.mesh, self.faces(preview.mesh, crease_deg)
         selection, chosen = _selection(design, table, preview)
         default = Selection()
         ways = [key for key in OTHER_WAYS if getattr(selection, key) != getattr(default, key)]
@@ -101,7 +101,7 @@ class Picker:
 
     def face(self, design: Design, triangle: int, crease_deg: float | None, alike: bool) -> Row:
         """Return the face to which a triangle belongs, as an item of a design's list `faces`."""
-        faces = self._faces(preview_part(design).mesh, crease_deg)
+        faces = self.faces(preview_part(design).mesh, crease_deg)
         return _row(faces, _face_of(faces, triangle), crease_deg, alike)
 
     def face_down(
@@ -118,7 +118,7 @@ class Picker:
                 [degrees]; None for the faces of a CAD file.
         """
         preview = preview_part(design)
-        mesh, faces = preview.mesh, self._faces(preview.mesh, crease_deg)
+        mesh, faces = preview.mesh, self.faces(preview.mesh, crease_deg)
         normal = faces.normal(_face_of(faces, triangle))
         if not normal.any():
             raise InputError("this face bends all round and faces no way; click another one")
@@ -133,7 +133,8 @@ class Picker:
             changes |= {f"part.offset_mm.{k}": 0.0 for k in (0, 1) if design.part.offset[k]}
         return changes
 
-    def _faces(self, mesh: PartMesh, crease_deg: float | None) -> Faces:
+    def faces(self, mesh: PartMesh, crease_deg: float | None) -> Faces:
+        """Return the part's faces that meet at a crease angle; None for those of a CAD file."""
         key = id(mesh), crease_deg
         if key not in self._known:
             if len(self._known) > 8:
@@ -144,7 +145,7 @@ class Picker:
 
     def _mask(self, row: Row, mesh: PartMesh) -> np.ndarray:
         """Return True for each triangle that an item of a design's list `faces` chooses, (m,)."""
-        faces = self._faces(mesh, FaceAt.model_validate(row).crease)
+        faces = self.faces(mesh, FaceAt.model_validate(row).crease)
         face, _ = faces.at(1e-3 * np.array(row["at_mm"]))
         if row.get("alike"):
             return np.asarray(faces.alike(face)[faces.of_triangle])

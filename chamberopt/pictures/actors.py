@@ -12,6 +12,7 @@ from chamberopt.pictures.charts.colours import (
     FEW_DENTS,
     FIXTURE_COLOURS,
     GLASS,
+    KINDS,
     OUTSIDE,
     PART_GREY,
     SONOTRODE,
@@ -36,6 +37,12 @@ def light(plotter: Any) -> None:
     plotter.set_background(BACKGROUND)
     plotter.remove_all_lights()
     plotter.add_light(pyvista().Light(light_type="headlight"))
+
+
+def body_meanings(chambers: Sequence[Surface]) -> list[tuple[str, str]]:
+    """Return the colours of sonotrode, and of holder and mask if any, with meanings."""
+    bodies = dict.fromkeys(name for one in chambers for name in fixture_marks(one))
+    return [(KINDS[name].colour, KINDS[name].label) for name in ("sonotrode", *bodies)]
 
 
 def colour_meanings(parts: Sequence[DrawnPart]) -> list[tuple[str, str]]:

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.pictures.actors import SCATTER, add_edges, add_part, colour_meanings
+from chamberopt.pictures.actors import SCATTER, add_edges, add_part, body_meanings, colour_meanings
 from chamberopt.pictures.camera import target_in_chamber
-from chamberopt.pictures.charts.colours import SONOTRODE
 from chamberopt.pictures.drawn_part import DrawnPart, colour_range
 from chamberopt.pictures.panels import choose_views, part_panels
 from chamberopt.pictures.picture_page import ColourBar, Row, write_page
@@ -59,7 +58,7 @@ def render_coverage(job: dict[str, Any]) -> None:
 
         panels = part_panels(add, part.inside, part.surface, chamber, views)
         rows.append(Row(title, panels))
-    legend = [(SONOTRODE, "sonotrode"), *colour_meanings(parts)]
+    legend = [*body_meanings(chambers), *colour_meanings(parts)]
     remarks = [f"part {size_text(parts[0].surface)}", SCATTER]
     write_page(job["picture"], rows, legend, coverage_bar(parts, limits), remarks)
 

@@ -1,4 +1,4 @@
-"""Draw every dent of one peening treatment on the part as a .png, with unpeened surface black.
+"""Draw every dent of one peening treatment on the part as a .png, with unpeened surface pale.
 
 Each dent is a flat disc of its diameter in the plane of the triangle that was hit. It is lifted a
 little so that the facets of a rounded edge do not hide it. Later dents are drawn over earlier
@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 MIN_PIXELS, MAX_PIXELS = 200, 4000  # longer side: still readable, and allowed by graphics drivers
 MIN_SHORTER_SIDE = 4  # pixels; a target seen edge on is narrower
 MARGIN = 1.06  # sides of the picture over sides of the target
-DARKEST = 0.35  # start of the colours of viridis that cannot be mistaken for black
+GROUND = "#efe9da"  # of the target without dents: a print of black would be all ink
+LIGHTEST = 0.8  # end of the colours of viridis that cannot be mistaken for the ground
 AMBIENT = 0.75  # brightness of a surface seen edge on, over its brightness face on
 INNER, RIM_SHADE = 0.8, 0.72  # a dent's darker rim: its inner radius and its brightness
 MIN_RIM_PIXELS = 12.0  # smallest diameter of a dent with a drawn rim
@@ -86,17 +87,17 @@ def render_dents(job: dict[str, Any]) -> None:
         Panel(render_side(part, discs, view, job["pixels"]), caption, is_cut=part.rest.n_cells > 0)
         for view, caption in zip(_views(part, job["view"]), NEAR_CAPTIONS, strict=False)
     ]
-    legend = [("black", "not peened"), (PART_GREY, "not in the target")]
+    legend = [(GROUND, "not peened"), (PART_GREY, "not in the target")]
     bar = ColourBar("dent diameter [µm]", colours, limits, "both")
     write_page(job["picture"], [Row(job["title"], panels)], legend[: 1 + panels[0].is_cut], bar)
 
 
 def dent_colours() -> Colormap:
-    """Return the light part of viridis, a colour map that colour-blind readers can read."""
+    """Return the dark part of viridis, a colour map that colour-blind readers can read."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
-    return ListedColormap(colormaps["viridis"](np.linspace(DARKEST, 1.0, 256)), "light viridis")
+    return ListedColormap(colormaps["viridis"](np.linspace(0.0, LIGHTEST, 256)), "dark viridis")
 
 
 def _views(part: DrawnPart, wanted: Vector | None) -> list[np.ndarray]:
@@ -111,15 +112,20 @@ def _views(part: DrawnPart, wanted: Vector | None) -> list[np.ndarray]:
 
 
 def render_side(
-    part: DrawnPart, discs: Discs, view: Sequence[float] | np.ndarray, pixels: int
+    part: DrawnPart,
+    discs: Discs,
+    view: Sequence[float] | np.ndarray,
+    pixels: int,
+    ground: str = GROUND,
 ) -> View:
-    """Render the black target and its dents from one direction.
+    """Render the target and its dents from one direction.
 
     Args:
         part: the part to draw, with its whole target. The rest of the part is grey.
         discs: dents in order of time.
         view: direction to the eye.
         pixels: longer side of the image.
+        ground: colour of the target without dents.
     Returns:
         The image.
     Raises:
@@ -136,7 +142,7 @@ def render_side(
     plotter = pyvista().Plotter(off_screen=True, window_size=[columns, rows])
     plotter.enable_anti_aliasing("ssaa")
     light(plotter)
-    target = plotter.add_mesh(part.whole, color="black", lighting=False, **NO_RENDER)
+    target = plotter.add_mesh(part.whole, color=ground, lighting=False, **NO_RENDER)
     rest = plotter.add_mesh(
         part.rest if part.rest.n_cells else pyvista().Sphere(radius=0.0),
         color=PART_GREY, ambient=AMBIENT, diffuse=1.0 - AMBIENT, **NO_RENDER,

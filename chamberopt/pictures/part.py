@@ -11,7 +11,7 @@ import numpy as np
 from chamberopt.chamber.build import without_specks
 from chamberopt.chamber.checks.check import touched
 from chamberopt.chamber.flexure import softness_of_part
-from chamberopt.pictures.actors import FAULT, NO_RENDER, add_edges
+from chamberopt.pictures.actors import FAULT, NO_RENDER, add_edges, body_meanings
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, pushed_back, seen_area
 from chamberopt.pictures.charts.colours import BLUE, KINDS
 from chamberopt.pictures.panels import (
@@ -25,14 +25,7 @@ from chamberopt.pictures.panels import (
 from chamberopt.pictures.picture_page import Panel, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess, picture_path
 from chamberopt.pictures.view import render_view
-from chamberopt.results.vtp_files import (
-    MM,
-    Surface,
-    cavity_surface,
-    fixture_marks,
-    pyvista,
-    size_text,
-)
+from chamberopt.results.vtp_files import MM, Surface, cavity_surface, pyvista, size_text
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -127,8 +120,7 @@ def render_part(job: dict[str, Any]) -> None:
     part, shown = _coloured(job, kinds)
     legend = [COLOURS[k] for k in np.unique(np.concatenate([kind for _, kind in shown]))]
     if job["chamber"] is not None:
-        others = [KINDS[name] for name in ("sonotrode", *fixture_marks(job["chamber"]))]
-        legend = [*((kind.colour, kind.label) for kind in others), *legend]
+        legend = [*body_meanings([job["chamber"]]), *legend]
     legend = legend if not len(edges) else [(FAULT, "what the message tells of")]
     rows = [Row(job["title"], _panels(job, part, shown, COLOURS))]
     if softness is not None:

@@ -199,7 +199,6 @@ def viewer(scenes: Sequence[PartScene]) -> str:
         )
     return (
         f'<div class="controls"><label>Colour by <select id="quantity">{options}</select></label>'
-        '<label><input type="checkbox" id="glass" checked> show the chamber</label>'
         '<label><input type="checkbox" id="fit"> fit the colours to the values shown</label>'
         '<span id="times"><label for="time">after</label>'
         f'<input type="range" id="time" min="0" max="{last:g}" step="{now / 60.0:.15g}" '

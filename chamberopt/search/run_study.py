@@ -148,11 +148,24 @@ class StudyResult:
         return self.gain.low > 0.0
 
 
+class StudyProgress(NamedTuple):
+    """What a study tells its progress.
+
+    Attributes:
+        evaluations: called as evaluations(done, total, best) after each evaluation, in evaluations
+            with all replicas; `total` is the most that may follow, and never grows.
+        replicas: called as replicas(done, total, None) for the candidates that are simulated now.
+    """
+
+    evaluations: Progress | None
+    replicas: Progress | None = None
+
+
 def run_study(
     study: Study,
     folder: StudyFolder,
     executor: Executor,
-    progress: Progress | None = None,
+    progress: StudyProgress | None = None,
     simulator: Simulator | None = None,
     stop: Stop | None = None,
     at_once: int | None = None,
@@ -168,8 +181,7 @@ def run_study(
         study: the study of the folder, with its effects resolved.
         folder: folder of the study. If this very study was interrupted in it, it is resumed, and
             the result is the same, bit for bit, as without the interruption.
-        progress: called as progress(done, total, best) after each evaluation, in evaluations with
-            all replicas; `total` is the most that may follow, and never grows.
+        progress: what is called after each evaluation, and for replicas while it runs.
         simulator: replaces the simulation, e.g. in tests.
         stop: called before each evaluation; the study stops with KeyboardInterrupt if it is True.
         at_once: number of evaluations that memory can hold at a time; by default optimizer.batch.
@@ -180,8 +192,10 @@ def run_study(
     folder.begin()
     save_inputs(study, folder.path)
     target = fixed_target(study)
-    evaluator = CandidateEvaluator(study, simulator or ChamberSimulator(study, executor, target))
-    search = Search(study, folder, progress, has_promise=evaluator.has_promise)
+    evaluations, replicas = progress or StudyProgress(None)
+    own = ChamberSimulator(study, executor, target, replicas)
+    evaluator = CandidateEvaluator(study, simulator or own)
+    search = Search(study, folder, evaluations, has_promise=evaluator.has_promise)
     # With fewer threads than a batch has candidates, some of them wait: figures are the same.
     batch = study.optimizer.batch
     threads = ThreadPoolExecutor(min(batch, at_once or batch), "candidate")
@@ -304,6 +318,28 @@ class _Simulated(NamedTuple):
     known: ReplicaSet
 
 
+class _ReplicasUnderway:
+    """The replicas of all candidates that are simulated now, each in a thread of its own."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress, self._lock = progress, threading.Lock()
+        self._now: dict[int, tuple[float, int]] = {}  # done and total, by the thread
+
+    def tell(self, done: float, total: int, best: float | None) -> None:
+        """Tell of the replicas of this thread's candidate, as a function `Progress`."""
+        if self._progress is None:
+            return
+        with self._lock:
+            self._now[threading.get_ident()] = done, total
+            all_done, all_total = map(sum, zip(*self._now.values(), strict=True))
+            self._progress(all_done, all_total, best)
+
+    def end(self) -> None:
+        """Take note that this thread's candidate is simulated."""
+        with self._lock:
+            self._now.pop(threading.get_ident(), None)
+
+
 class ChamberSimulator:
     """Simulates the candidates of a study: builds the chamber, runs replicas, evaluates coverage.
 
@@ -311,7 +347,14 @@ class ChamberSimulator:
     Several threads may call it at a time.
     """
 
-    def __init__(self, study: Study, executor: Executor, target: np.ndarray | None) -> None:
+    def __init__(
+        self,
+        study: Study,
+        executor: Executor,
+        target: np.ndarray | None,
+        progress: Progress | None = None,
+    ) -> None:
+        self._underway = _ReplicasUnderway(progress)
         self._study, self._executor, self._target = study, executor, target
         # Replicas of confirmed candidates. Chambers and targets, which take ten times as much
         # memory, are built again if a later round asks for more replicas.
@@ -326,7 +369,11 @@ class ChamberSimulator:
         is_shown = stream == "confirm"  # all figures of a result, which the search needs not
         plan = ReplicaPlan(replicas, stream, self._study.objective.goals[0], is_shown)
         run = evaluate_calibrated if is_shown else evaluate
-        evaluation = run(design, one.chamber, self._executor, plan=plan, known=one.known)
+        what = design, one.chamber, self._executor, self._underway.tell
+        try:
+            evaluation = run(*what, plan=plan, known=one.known)
+        finally:
+            self._underway.end()
         return replace(evaluation, timings={"chamber": seconds, **evaluation.timings})
 
     def reachable(self, design: Design) -> float:

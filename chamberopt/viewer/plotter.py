@@ -11,7 +11,15 @@ from chamberopt.common.errors import InputError
 from chamberopt.design.shape_surface import is_sonotrode
 from chamberopt.geometry.triangles import unit_normals
 from chamberopt.pictures import overlay
-from chamberopt.pictures.actors import DARK, PALE, add_chamber, add_part, colour_meanings, light
+from chamberopt.pictures.actors import (
+    DARK,
+    PALE,
+    add_chamber,
+    add_part,
+    body_meanings,
+    colour_meanings,
+    light,
+)
 from chamberopt.pictures.camera import (
     Room,
     cells_of,
@@ -23,7 +31,7 @@ from chamberopt.pictures.camera import (
     seen_area,
     target_in_chamber,
 )
-from chamberopt.pictures.charts.colours import PART_GREY, SONOTRODE, zone_colour
+from chamberopt.pictures.charts.colours import PART_GREY, zone_colour
 from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.results.vtp_files import pyvista, size_text
 from chamberopt.viewer.opened_result import (
@@ -294,14 +302,12 @@ def _remarks(result: OpenedResult, state: ViewState, pale: np.ndarray | None) ->
 
 def _legend(result: OpenedResult, state: ViewState) -> list[tuple[str, str]]:
     """Return the legend of a view: colours that are not on the colour bar, with meanings."""
+    bodies = body_meanings([result.chamber]) if state.chamber else []
     if state.quantity == "zones":
-        entries = [(zone_colour(k), name) for k, name in enumerate(result.info.zones)]
-        entries.append((PART_GREY, "in no zone"))
-        return [(SONOTRODE, "sonotrode"), *entries] if state.chamber else entries
-    entries = colour_meanings([result.part])
-    if state.below is not None:
-        entries.append((PALE, f"coverage {state.below:g} % or more"))
-    return [(SONOTRODE, "sonotrode"), *entries] if state.chamber else entries
+        zones = [(zone_colour(k), name) for k, name in enumerate(result.info.zones)]
+        return [*bodies, *zones, (PART_GREY, "in no zone")]
+    pale = [] if state.below is None else [(PALE, f"coverage {state.below:g} % or more")]
+    return [*bodies, *colour_meanings([result.part]), *pale]
 
 
 def _cut(actors: Sequence[Any], cut: Plane, result: OpenedResult) -> None:

@@ -11,7 +11,7 @@ from chamberopt.common.executor import core_count, open_executor
 from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
 from chamberopt.results.load import load_trials
 from chamberopt.search.ask_and_tell import most_evaluations
-from chamberopt.search.run_study import StudyResult, run_study
+from chamberopt.search.run_study import StudyProgress, StudyResult, run_study
 from chamberopt.search.run_sweep import SweepPlan, SweepResult, run_sweep
 from chamberopt.simulation.effort import Effort
 from chamberopt.workflows.ranges import EndError, study_ranges
@@ -70,7 +70,9 @@ def optimise_study(
         chamber = build_chamber(folder.study.design)
     at_once = _candidates_at_once(folder.study, chamber, teller)
     study, advice = _prepare(folder, chamber, executor, teller)
-    with teller.step("evaluations", most_evaluations(study)) as progress:
+    whole = teller.step("evaluations", most_evaluations(study))
+    with whole as evaluations, teller.step("replicas of the candidates at work") as replicas:
+        progress = StudyProgress(evaluations, replicas)
         result = run_study(study, folder, executor, progress, stop=stop, at_once=at_once)
     ranges, failed = None, []
     if with_ranges:

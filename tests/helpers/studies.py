@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from chamberopt.common.executor import SerialExecutor
-from chamberopt.search.run_study import StudyResult, run_study
+from chamberopt.search.run_study import StudyProgress, StudyResult, run_study
 from chamberopt.search.run_sweep import SweepPlan, SweepResult, run_sweep
 from chamberopt.search.study import Study
 from chamberopt.search.study_folder import open_study_folder
@@ -22,7 +22,8 @@ def run_in_folder(
 ) -> StudyResult:
     with open_study_folder(study, path) as folder:
         executor = executor or SerialExecutor()
-        return run_study(study, folder, executor, progress, simulator, stop, at_once)
+        told = StudyProgress(progress)
+        return run_study(study, folder, executor, told, simulator, stop, at_once)
 
 
 def sweep_in_folder(

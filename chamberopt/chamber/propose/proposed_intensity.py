@@ -299,7 +299,7 @@ def as_no_wish(made: Proposal) -> Proposal:
 
 def _with_strip(predicted: PredictedIntensity) -> str:
     """Return an intensity in words, also on the N strip where it is measured on one."""
-    factor = "" if predicted.factor == 1.0 else f" x/÷ {plain(predicted.factor, 2)}"
+    factor = "" if predicted.factor == 1.0 else f", within a factor of {plain(predicted.factor, 2)}"
     of_n = f" ({plain(OVER_A['N'] * predicted.value, 2)} mm on N strips)"
     return f"{plain(predicted.value, 2)} mmA{factor}{of_n if predicted.value < ON_N else ''}"
 

@@ -233,7 +233,8 @@ def _intensity_limits(design: Design) -> str:
         return f"\n[constraints]\n{limits}  # mmA, the wanted intensity\n"
     ends = (float(f"{1e3 * one / USUAL_K:.3g}") for one in wanted)
     limits = _line("strength_um", dict(zip(("min", "max"), ends, strict=True)))
-    text = f"the wanted intensity, if {USUAL_K:g} mmA/mm hold: x/÷ {math.exp(USUAL_K_LOG_SD):.2g}"
+    factor = f"within a factor of {math.exp(USUAL_K_LOG_SD):.2g}"
+    text = f"the wanted intensity, if {USUAL_K:g} mmA/mm hold: {factor}"
     return f"\n# [constraints]  # to hold candidates to it\n# {limits}  # {text}\n"
 
 

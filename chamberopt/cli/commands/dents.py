@@ -21,7 +21,7 @@ def dents(
     view: View = None,
     pixels: int = 1000,
 ) -> None:
-    """Draw each dent of one replica at its place and size; the surface without dents is black.
+    """Draw each dent of one replica at its place and size; the surface without dents is pale.
 
     Parameters
     ----------

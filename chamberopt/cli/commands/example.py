@@ -29,6 +29,7 @@ def example(name: Literal["gear", "plate", "blade", "fir_tree"], /, *, out: Out 
         write_bytes,
         write_text,
     )
+    from chamberopt.common.shipped import shipped_files
 
     shipped = shipped_files()
     if name == CAD_FILE:
@@ -55,15 +56,3 @@ def example(name: Literal["gear", "plate", "blade", "fir_tree"], /, *, out: Out 
             f"  chamberopt report results/{name}_study",
         ]
     )
-
-
-def shipped_files() -> Path:
-    """Return the folder of the shipped designs/ and studies/.
-
-    It is in the installed package, or else at the root of a source checkout.
-    """
-    import chamberopt
-
-    package = Path(chamberopt.__file__).parent
-    examples = package / "examples"
-    return examples if examples.is_dir() else package.parent

@@ -83,9 +83,9 @@ class RestitutionTable(FileTable):
         alloy, hardness = getattr(self, "alloy", None), getattr(self, "hardness_HB", None)
         words = [alloy] if alloy else []
         words += [f"{hardness:g} HB"] if hardness else []
-        words.append("e by a table" if self.C0 is None else f"C0 = {self.C0:g}")
-        words += [] if self.v0_m_s is None else [f"v0 = {self.v0_m_s:g} m/s"]
-        return ", ".join(words)
+        slow = "restitution by a table" if self.C0 is None else f"restitution {self.C0:g}"
+        ends = "" if self.v0_m_s is None else f" up to {self.v0_m_s:g} m/s"
+        return ", ".join([*words, slow + ends])
 
     @property
     def restitution(self) -> RestitutionLaw:

@@ -1,7 +1,7 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
 import { ask, attempt, element, onPage, unpack, warning, wordsOf } from "./state.js";
 import { followed, sinceBegin, stage } from "./steps.js";
-import { coloursOf, lights, wayToTarget } from "./surfaces.js";
+import { colourByState, lights, wayToTarget } from "./surfaces.js";
 
 const find = (id) => document.getElementById(id);
 const option = (one) => element("option", { value: [one].flat()[0], textContent: [one].flat().at(-1) }); // a text, or a pair with its words
@@ -14,6 +14,7 @@ async function show(part) {
   find("file").accept = here.suffixes.join(",");
   find("part").replaceChildren(element("option", { value: "", textContent: "choose…" }), ...here.parts.map(option));
   find("here").hidden = !here.parts.length;
+  find("example").hidden = here.parts.length > 0;
   find("part").value = part ?? here.first;
   for (const [id, names] of [["material", here.alloys], ["shot", here.balls], ["shape", here.shapes], ["shop", here.shops],
     ["calibration", here.calibrations]]) {
@@ -37,13 +38,13 @@ async function open(design) {
   location.reload();
 }
 
-const view = new View3D(find("view"));
+const view = new View3D(find("view")), tools = new Tools([view], find("tools"));
 let drawnPart = "", pointed = "", seen = null;
 const CHAMBER = ["walls", "sonotrode", "edges"];
 
 // Draw the part beside its size, where the names of its surfaces are pointed at.
 async function draw(part) {
-  find("place").append(find("view"));
+  find("place").append(find("seen"));
   find("place").hidden = !part;
   if (part === drawnPart && !view.get("walls")) return;
   for (const name of ["part", ...CHAMBER]) view.remove(name);
@@ -52,9 +53,10 @@ async function draw(part) {
   const told = unpack(await ask("/view", { part, unit: known.unit }));
   if (part !== drawnPart) return;
   seen = told;
-  view.kinds = seen.kinds;
+  tools.legend(find("legend"), seen.kinds);
   pointed = seen.pointed;
   view.surface("part", { points: seen.points, triangles: seen.triangles, kind: "rest", open: !seen.closed });
+  view.get("part").userData.kinds = []; // no target is known yet
   lookAt(view.extent());
   document.body.dataset.drawn = part;
 }
@@ -66,14 +68,14 @@ function lookAt({ low, high }, way = [0.49, -0.79, 0.35]) {
 
 // Put the part into the chamber that is proposed, as far as it is known, in the place of the picture until there is one.
 async function drawChamber(hasPicture) {
-  (hasPicture ? find("of-choices") : find("place-of-draft")).prepend(find("view"));
+  (hasPicture ? find("of-choices") : find("place-of-draft")).prepend(find("seen"));
   const answer = unpack(await ask("/chamber", {}));
   if (!seen || answer.state.length !== seen.triangles.length / 3) return; // of another part
   view.pose("part", answer.rotation, answer.shift);
-  view.colourTriangles("part", coloursOf(seen, answer.state));
+  colourByState(view, "part", seen, answer.state);
   view.surface("walls", { points: answer.points, triangles: answer.walls, kind: "wall", opacity: 0.16 });
   view.surface("sonotrode", { points: answer.points.slice(), triangles: answer.sonotrode, kind: "sonotrode", opacity: 0.6 });
-  view.lines("edges", answer.edges, seen.edges);
+  view.lines("edges", answer.edges, seen.edges, "wall");
   const [low, high] = answer.shape_mm;
   const box = { low: low.map((x, i) => Math.min(x, answer.part_mm[0][i])), high: high.map((x, i) => Math.max(x, answer.part_mm[1][i])) };
   lookAt(box, wayToTarget(view.get("part"), answer));
@@ -114,13 +116,19 @@ async function look(part, unit = "") {
 
 async function bring(file) {
   if (!file) return;
-  find("known").textContent = `copying ${file.name} …`;
-  try {
-    const { part } = await ask(`/upload?name=${encodeURIComponent(file.name)}`, file);
-    await show(part);
-    await look(part);
-  } finally { find("file").value = ""; }
+  find("known").textContent = `reading ${file.name} …`;
+  document.body.dataset.known = "";
+  try { await take(await ask(`/upload?name=${encodeURIComponent(file.name)}`, file)); } finally {
+    find("file").value = "";
+    if (!document.body.dataset.known) find("known").textContent = ""; // it was refused
+  }
 }
+
+async function take({ part }) {
+  await show(part);
+  await look(part);
+}
+find("example").addEventListener("click", () => attempt(async () => take(await ask("/example", {}))));
 
 const drop = find("drop");
 for (const name of ["dragenter", "dragover"]) drop.addEventListener(name, (event) => { event.preventDefault(); drop.classList.add("over"); });

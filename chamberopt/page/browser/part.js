@@ -3,7 +3,7 @@
 // Fills the panels #part-0, #part-1 ... of a page with scenes, which the controls on it serve together.
 function showParts({ quantities, scenes, scales, kinds }) {
   const find = (id) => document.getElementById(id);
-  const controls = { quantity: find("quantity"), time: find("time"), fit: find("fit"), glass: find("glass") };
+  const controls = { quantity: find("quantity"), time: find("time"), fit: find("fit") };
   const label = find("label");
   const SOLID = ["part", "few", "unreached", "rest"];
 
@@ -95,12 +95,11 @@ function showParts({ quantities, scenes, scales, kinds }) {
     view.kinds = kinds;
     for (const [name, surface] of Object.entries(scene.surfaces))
       view.surface(name, { ...surface, scale: name === "part", open: SOLID.includes(name) && !scene.whole });
-    view.lines("edges", new Float32Array(bytes(scene.edges.ends)), scene.edges.colour);
+    view.lines("edges", new Float32Array(bytes(scene.edges.ends)), scene.edges.colour, "wall");
     view.look(scene.view);
     return view;
   });
-  new Tools(views, controls.quantity.closest(".controls"));
-  Tools.legend(find("kinds"), views, kinds);
+  new Tools(views, controls.quantity.closest(".controls")).legend(find("kinds"), kinds);
 
   let waiting = false; // a slider moves faster than a large part can be coloured
   function recolour() {
@@ -200,9 +199,6 @@ function showParts({ quantities, scenes, scales, kinds }) {
   controls.quantity.addEventListener("change", recolour);
   controls.fit.addEventListener("change", recolour);
   controls.time.addEventListener("input", recolour);
-  controls.glass.addEventListener("change", () => {
-    for (const view of views) view.show(["sonotrode", "walls", "deflectors", "edges", "holder", "mask"], controls.glass.checked);
-  });
   recolour();
   return views;
 }

@@ -15,6 +15,7 @@ export function fillRun() {
   while (names.includes(free(k))) k += 1;
   find("study-name").value = free(k);
   allow();
+  tellDuration();
   showVaried();
 }
 
@@ -26,7 +27,14 @@ function allow() {
   find("search-sliders").disabled = isRunning;
   for (const button of document.querySelectorAll("[data-command]")) button.disabled = isRunning || (button.dataset.command === "simulate") !== (kind === "design");
 }
-find("of").addEventListener("change", allow);
+find("of").addEventListener("change", () => { allow(); tellDuration(); });
+
+// How long the file will take, where the server knows that from results.
+async function tellDuration() {
+  const of = find("of").value, known = await ask("/duration", { of }).catch(() => null);
+  if (find("of").value === of) find("lasts").textContent = known?.words ?? "";
+}
+document.querySelector("[data-tab=run]").addEventListener("click", tellDuration);
 
 function showVaried() {
   const items = [...varied].map((name) => element("li", { title: name, textContent: `${state.fields.find((one) => one.name === name)?.in_full}: ${ends.get(name).join(" … ")}` }));
@@ -43,6 +51,7 @@ export async function start(command, of) {
 // Follow a command to its end, and tell what it has left.
 export async function followToEnd(started) {
   const exit = await follow(started);
+  tellDuration();
   showResult(exit === 0 ? started.result : "");
 }
 const showResult = (result) => document.dispatchEvent(new CustomEvent("ended", { detail: result }));

@@ -1,17 +1,17 @@
 // The view: part and chamber as the newest answers have them, and handles that turn and move the part.
 import { change, endMove, unpack, value } from "./state.js";
-import { coloursOf, wayToTarget } from "./surfaces.js";
+import { colourByState, wayToTarget } from "./surfaces.js";
 
 const CLEAR = 0.16, FACE = 0.6; // opacity of walls and sonotrode
 const BODIES = ["deflectors", "holder", "mask"]; // that not every chamber has
 export const view = new View3D(document.getElementById("view"));
-new Tools([view], document.getElementById("tools"));
+const tools = new Tools([view], document.getElementById("tools"));
 let bodies = null, through = false;
 let part = null, handles = null, grip = null, placed = null, coloured = [];
 
 export function showPart(buffer) {
   part = unpack(buffer);
-  Tools.legend(document.getElementById("legend"), [view], part.kinds);
+  tools.legend(document.getElementById("legend"), part.kinds);
   view.surface("part", { points: part.points.slice(), triangles: part.triangles.slice(), open: !part.closed });
   placed = null;
   return part;
@@ -48,8 +48,7 @@ function colour(name, state) {
   const mesh = view.get(name);
   if (coloured[0] === mesh && coloured[1].every((kind, k) => kind === state[k])) return;
   coloured = [mesh, state];
-  mesh.userData.kinds = [...new Set(state)].map((kind) => part.states[kind]);
-  view.colourTriangles(name, coloursOf(part, state));
+  colourByState(view, name, part, state);
 }
 
 function walls(answer) {
@@ -58,11 +57,18 @@ function walls(answer) {
   };
   surface("walls", "wall", CLEAR, answer.walls);
   surface("deflectors", "wall", CLEAR, answer.deflectors);
-  surface("sonotrode", "sonotrode", view.camera.position.z < 0 ? 0.15 : FACE, answer.sonotrode); // from below the part is seen through it
+  surface("sonotrode", "sonotrode", opacityOfSonotrode(), answer.sonotrode);
   bodies = answer;
   for (const name of ["holder", "mask"]) surface(name, name, through ? 0.35 : 1, answer[`${name}_triangles`], answer[`${name}_points`]);
-  view.lines("edges", answer.edges.slice(), part.edges);
+  view.lines("edges", answer.edges.slice(), part.edges, "wall");
 }
+
+// From below the part is seen through it.
+const opacityOfSonotrode = () => view.camera.position.z < 0 ? 0.15 : FACE;
+view.orbit.addEventListener("change", () => {
+  const sonotrode = view.get("sonotrode");
+  if (sonotrode) sonotrode.material.opacity = opacityOfSonotrode();
+});
 
 // Holder and mask are seen through while their faces are chosen.
 export function seeThrough(now) {
@@ -89,15 +95,16 @@ function lookAtAll() {
 
 view.renderer.domElement.addEventListener("dblclick", () => { if (placed) lookAtAll(); });
 
-// Sizes of the chamber and of the part's box, its height over the sonotrode, and the axes of the part's file.
+// Sizes of the chamber and the part's height over the sonotrode, the part's box, and the axes of the part's file.
 function dimensions() {
   const [low, high] = placed.shape_mm, [a, b] = placed.part_mm, size = Math.hypot(...high.map((x, i) => x - low[i]));
   const gap = 0.06 * size;
-  const ends = [
+  const chamber = [
     ...dimension([low[0], low[1], 0], [high[0], low[1], 0], [0, -gap, 0], size),
     ...dimension([high[0], high[1], 0], [high[0], high[1], high[2]], [gap, 0, 0], size),
     ...dimension([b[0], a[1], 0], [b[0], a[1], a[2]], [0, 0, 0], size),
   ];
+  const ends = [];
   for (const [i, j] of [[0, 1], [1, 3], [3, 2], [2, 0], [4, 5], [5, 7], [7, 6], [6, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
     for (const k of [i, j]) ends.push([k & 1 ? b[0] : a[0], k & 2 ? b[1] : a[1], k & 4 ? b[2] : a[2]]);
   const o = placed.shift, r = placed.rotation, long = 0.15 * size, axes = [];
@@ -107,10 +114,13 @@ function dimensions() {
     axes.push([`file ${"xyz"[k]}`, tip]);
   }
   view.lines("dimensions", Float32Array.from(ends.flat()), "#56616a");
-  view.texts("sizes", [
+  view.lines("dimensions of the chamber", Float32Array.from(chamber.flat()), "#56616a", "wall");
+  view.texts("sizes of the chamber", [
     [`${short(high[0] - low[0])} mm`, [0.5 * (low[0] + high[0]), low[1] - gap, -0.4 * gap]],
     [`${short(high[2])} mm`, [high[0] + gap, high[1], 0.8 * high[2]]],
     [`${short(a[2])} mm`, [b[0], a[1], 0.5 * a[2]]],
+  ], "wall");
+  view.texts("sizes", [
     [b.map((x, i) => short(x - a[i])).join(" × ") + " mm", [0.5 * (a[0] + b[0]), a[1], b[2] + 0.03 * size]],
     ...axes,
   ]);

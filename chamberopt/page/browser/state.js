@@ -130,6 +130,7 @@ export function show(values, words = "") {
 
 export const isUnsaved = () => Object.keys(state.changes).length > 0;
 
+const SAID = 4000, REFUSED = 20000; // ms that a message stays
 let fading = 0;
 // Text, or a message of the server: texts, and pairs of words with what they are in a file as a tip.
 export const onPage = (words) => [words].flat().map((one) => typeof one === "string" ? one
@@ -140,11 +141,13 @@ export const wordsOf = (error) => error.words ?? error.message;
 
 export function say(text, good = false) {
   const box = document.getElementById("message");
-  box.replaceChildren(...onPage(text));
+  const close = element("button", { textContent: "✕", ariaLabel: "Close the message" }), hide = () => { box.hidden = true; };
+  close.addEventListener("click", hide);
+  box.replaceChildren(...onPage(text), close);
   box.className = good ? "good" : "";
   box.hidden = !text;
   clearTimeout(fading);
-  if (good) fading = setTimeout(() => { box.hidden = true; }, 4000);
+  if (text) fading = setTimeout(hide, good ? SAID : REFUSED);
 }
 
 // Run an act; what goes wrong is said on the page.

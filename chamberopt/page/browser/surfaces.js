@@ -1,12 +1,13 @@
 // Surfaces of the part: the colours of their states, and what a button names, shown while it is pointed at or has the focus.
 import { attempt, unpack } from "./state.js";
 
-// Colours of the part's triangles, [r, g, b] in 0..1 one after the other, by the state of each.
-export function coloursOf({ states, kinds }, state) {
+// Colour the part's triangles by the state of each, and tell the legend which states there are.
+export function colourByState(view, name, { states, kinds }, state) {
   const rgb = states.map((kind) => kinds[kind][1]).map((hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16) / 255));
   const colours = new Float32Array(3 * state.length);
   state.forEach((kind, k) => colours.set(rgb[kind], 3 * k));
-  return colours;
+  Object.assign(view.get(name).userData, { kind: "", kinds: [...new Set(state)].map((kind) => states[kind]) });
+  view.colourTriangles(name, colours);
 }
 
 // Unit vector to the eye from which most of the target faces it, of twelve from above and as many from below.

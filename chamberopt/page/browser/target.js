@@ -1,5 +1,5 @@
 // Choosing the target and zones by clicking faces, or by names of the file, and turning a face down.
-import { ask, attempt, change, element, say, state } from "./state.js";
+import { ask, attempt, change, element, say, state, unpack } from "./state.js";
 import { seeThrough, setHandles, triangleAt, view } from "./scene.js";
 import { lights } from "./surfaces.js";
 
@@ -75,15 +75,27 @@ function showBorders() {
 }
 find("cad-face").addEventListener("change", showBorders);
 
-// The face of the CAD file under the pointer lights up while clicks choose faces.
+// Number of the face of each triangle that a click takes; null until the server has found faces up to these creases.
+let creased = {};
+function faces() {
+  const { part } = fillTarget, crease_deg = Number(find("crease").value);
+  if (byCadFaces()) return part.cad_face;
+  if (creased.part !== part || creased.crease_deg !== crease_deg) {
+    const asked = creased = { part, crease_deg, of: null };
+    ask("/faces", { crease_deg }).then((answer) => { asked.of = unpack(answer).face; }, () => {}); // a click tells what is wrong
+  }
+  return creased.of;
+}
+
+// The face under the pointer lights up while clicks choose faces.
 let lit = null;
 function light(event) {
-  const isOn = byCadFaces() && !event?.buttons && (!find("target").hidden || isFaceDown());
-  const triangle = isOn && event ? triangleAt(event) : null, face = triangle === null ? null : fillTarget.part.cad_face[triangle];
+  const isOn = !event?.buttons && (!find("target").hidden || isFaceDown()), of = isOn && event ? faces() : null;
+  const triangle = of ? triangleAt(event) : null, face = triangle === null ? null : of[triangle];
   if (face === lit) return;
   lit = face;
   const own = [];
-  if (face !== null) fillTarget.part.cad_face.forEach((one, k) => { if (one === face) own.push(k); });
+  if (face !== null) of.forEach((one, k) => { if (one === face) own.push(k); });
   view.highlight("part", own.length ? own : null, fillTarget.part.pointed);
 }
 view.renderer.domElement.addEventListener("pointermove", light);

@@ -354,7 +354,7 @@ class TestCheck:
         facts = json.loads(out)
         assert status == 0
         assert facts["shot"]["balls"] == 30
-        assert facts["materials"]["wall"] == "42CrMo4, 300 HB, C0 = 0.91, v0 = 0.44 m/s"
+        assert facts["materials"]["wall"] == "42CrMo4, 300 HB, restitution 0.91 up to 0.44 m/s"
         # a 64-sided prism of 50 mm, 15 mm high: the plate is the lid
         area = 64 / 2 * 25**2 * 0.0980171403295606  # n/2 r² sin(2 pi / n)
         assert facts["chamber"]["free_volume_cm3"] == pytest.approx(area * 15 / 1000, rel=1e-5)

@@ -292,7 +292,7 @@ def test_a_usual_intensity_that_no_pilot_tells_is_no_reason_to_stop(
     numbers = [int(one) for one in re.findall(r'"step (\d) of 7: ', "".join(begun))]
     assert numbers == sorted(numbers) == [1, 2, 3, 4, 5, 6, 7]
     assert sum("reading the part" in line for line in begun) == 2  # of the stage, and in it
-    assert "intensity    expected 0.9 mmA x/÷ 2.5\n" in said
+    assert "intensity    expected 0.9 mmA, within a factor of 2.5\n" in said
     assert "OUTSIDE THE USUAL RANGE, 0.15-0.25A, usual for titanium" in " ".join(said.split())
     assert main([*words, "--intensity", "usual", "--out", "asked"]) == 2
     assert "--intensity: the shot hardly dents a strip" in capfd.readouterr().err

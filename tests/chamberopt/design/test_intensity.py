@@ -102,7 +102,7 @@ def test_without_strips_the_band_is_that_of_the_usual_constant() -> None:
     assert found.factor == pytest.approx(2.46, abs=0.01)
     wide = math.exp(1.96 * USUAL_K_LOG_SD)
     assert (found.low, found.high) == pytest.approx((0.27 / wide, 0.27 * wide))
-    assert "0.27 mmA, x/÷ 2.5 (one standard deviation, at 95 %" in found.in_words
+    assert "0.27 mmA, within a factor of 2.5 (one standard deviation, at 95 %" in found.in_words
     assert "chamberopt calibrate" in found.in_words
     poor = PredictedIntensity.of({"strength_um": Estimate(20.0, 19.6)}, None)  # sd of ln S: 0.5
     assert poor is not None

@@ -101,7 +101,7 @@ def test_the_sheet_has_the_band_beside_the_predicted_intensity() -> None:
     assert rows["that is"].startswith("2.5 × the time to 98 %")
     assert rows["coverage wanted"] == "200 %: 2 × the time to 98 %; met"
     assert rows["intensity wanted"].startswith("0.15 to 0.2 mmA, mean over the target; not decided")
-    assert rows["intensity predicted"].startswith("0.18 mmA, x/÷ 2.5")
+    assert rows["intensity predicted"].startswith("0.18 mmA, within a factor of 2.5")
     bare: Any = SimpleNamespace(design=a_design(250.0), metrics=metrics)
     assert [*dict(wanted_rows(bare))] == ["that is"]
     assert [*intensity_lines(bare.design, metrics)] == []

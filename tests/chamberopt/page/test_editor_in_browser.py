@@ -121,14 +121,54 @@ def test_the_legend_hides_a_kind_and_the_view_turns_to_an_axis(opened: Page) -> 
         expect(wall).to_have_attribute("aria-pressed", str(not is_hidden).lower())
         opened.put("chamber.height_mm", 37 if is_hidden else 36)  # which draws the walls anew
         opened.wait("data-checked=reach")
-        page.get_by_label("view", exact=True).select_option(label="from above")
+        page.get_by_role("button", name="Top", exact=True).click()
         walls, part, way = page.evaluate(SEEN)
         assert (walls, part) == (not is_hidden, True)
     assert way == pytest.approx([0.0, 0.0, 1.0], abs=1e-3)
-    page.get_by_label("view", exact=True).select_option(label="as at first")
+    page.get_by_role("button", name="Isometric").click()
+    page.get_by_role("button", name="Fit").click()  # from the same side
+    assert page.evaluate(SEEN)[2] == pytest.approx([3**-0.5, -(3**-0.5), 3**-0.5], abs=1e-3)
+    page.locator("#view").dblclick(position={"x": 30, "y": 400})
     assert abs(page.evaluate(SEEN)[2][2]) == pytest.approx(0.33, abs=0.15)
     for _ in range(2):
         page.click("#undo")
+
+
+def test_a_switch_hides_the_chamber_as_its_legend_does(opened: Page) -> None:
+    page, chamber = opened.page, opened.page.get_by_label("show the chamber")
+    wall, sonotrode = (
+        page.locator(f"#legend [data-kind={kind}]") for kind in ("wall", "sonotrode")
+    )
+    sonotrode.click()
+    expect(chamber).to_be_checked()  # in part
+    chamber.uncheck()
+    expect(wall).to_have_attribute("aria-pressed", "false")
+    assert page.evaluate(SEEN)[:2] == [False, True]
+    chamber.check()
+    expect(sonotrode).to_have_attribute("aria-pressed", "true")
+    assert page.evaluate(SEEN)[:2] == [True, True]
+
+
+def test_the_sonotrode_is_seen_through_from_below_only(opened: Page) -> None:
+    sonotrode = (
+        """async () => (await import("/browser/scene.js")).view.get("sonotrode").material.opacity"""
+    )
+    for side, opacity in (("Bottom", 0.15), ("Isometric", 0.6)):
+        opened.page.get_by_role("button", name=side).click()
+        assert opened.page.evaluate(sonotrode) == opacity
+
+
+def test_the_face_under_the_pointer_lights_up(opened: Page) -> None:
+    """A side of a cube is two triangles."""
+    opened.tab("target")
+    page, view = opened.page, opened.page.locator("#view")
+    with page.expect_response("**/faces"):
+        page.mouse.move(*page.evaluate(FIND, None)[1:])
+    page.mouse.move(*page.evaluate(FIND, None)[1:])
+    expect(view).to_have_attribute("data-highlight", "2", timeout=WAIT)
+    opened.tab("numbers")
+    page.mouse.move(*page.evaluate(FIND, None)[1:])
+    expect(view).not_to_have_attribute("data-highlight", "2")
 
 
 def test_the_face_of_a_cad_file_lights_up_and_is_taken(opened: Page, tmp_path: Path) -> None:
@@ -311,8 +351,10 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     expect(page.locator("#of-words")).to_have_text(words)
     opened.tab("run")
     page.select_option("#of", "design.toml")
+    expect(page.locator("#lasts")).to_be_empty()  # nothing like it was simulated yet
     page.click("[data-command=simulate]")
     expect(page.locator("#progress")).to_contain_text("finished", timeout=WAIT)
+    expect(page.locator("#lasts")).to_contain_text("about 5 s")
     result = json.loads((folder / "results" / "design" / "result.json").read_text())
     out = folder / "by-command"
     assert main(["simulate", str(folder / "design.toml"), "--no-ranges", "--out", str(out)]) == 0

@@ -92,6 +92,7 @@ def test_a_wrong_file_or_wish_is_answered_in_words(front: Served, tmp_path: Path
     names = "evil.toml", "..%2Fx.stl", "%2Ftmp%2Fx.stl", ".x.stl", ""
     for name, said in (("box.stl", "already"), *((name, "not a part") for name in names)):
         assert said in upload(front, name, box + b"another")["error"]
+    assert "broken.stl" in upload(front, "broken.stl", b"solid of nothing")["error"]
     wrong = {"unit": "ft", "material": "--help", "shape": "own.py", "shot": "gravel", "pose": "up"}
     for option, given in wrong.items():
         error = front.ask("/propose", PROPOSED | {option: given})["error"]
@@ -117,6 +118,13 @@ def test_a_wrong_file_or_wish_is_answered_in_words(front: Served, tmp_path: Path
     assert "outside" in front.ask("/open", {"design": "../design.toml"})["error"]
     assert sorted(tmp_path.rglob("*")) == before
     assert b'id="drop"' in front.get("/").read()
+
+
+def test_a_part_of_the_program_is_an_example(front: Served, tmp_path: Path) -> None:
+    for _ in range(2):
+        assert front.ask("/example", {}) == {"part": "fir_tree.step"}
+    shipped = ROOT / "designs/parts/fir_tree.step"
+    assert (tmp_path / "fir_tree.step").read_bytes() == shipped.read_bytes()
 
 
 def test_files_are_taken_from_the_page_alone_and_not_too_large(front: Served) -> None:

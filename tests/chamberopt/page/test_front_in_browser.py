@@ -39,6 +39,8 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             expect(page.locator("#sentence")).to_contain_text("Peen face 1 (")
             assert page.locator("#picture img").evaluate("one => one.naturalWidth") > 0
             opened.wait("data-chamber=picture")  # it is seen in 3D too
+            kinds = {"target", "sonotrode", "chamber wall"}
+            assert set(page.locator("#legend li").all_text_contents()) >= kinds
             shown = page.locator("#rows tr", has_text="Balls")
             expect(shown).to_contain_text("1.2 mm")
             expect(page.locator("#choices button[aria-pressed=true]")).to_contain_text("face 1")

@@ -24,13 +24,25 @@ def test_balls_and_amplitudes_are_those_that_would_serve(
 
 
 def test_a_term_has_its_meaning_where_it_stands_first() -> None:
-    words = on_page("expected 0.06 mmA x/÷ 2.5 by 10 replicas; raise process.accuracy.replicas")
-    assert words[1] == ("x/÷", TERMS["x/÷"])
+    words = on_page(
+        "expected 0.06 mmA, within a factor of 2.5 by 10 replicas; raise process.accuracy.replicas"
+    )
+    assert words[1] == ("within a factor of", TERMS["within a factor of"])
     assert words[3] == ("replicas", TERMS["replicas"])
     assert words[5] == ("replicas of the accuracy of the process", "process.accuracy.replicas")
     assert on_page("v0_m_s of C0, then C0 again")[1:] == [
         ("C0", TERMS["C0"]), ", then C0 again",
     ]  # fmt: skip
+
+
+def test_a_command_is_named_as_the_page_has_it() -> None:
+    found = on_page("chamberopt simulate predicts it; “chamberopt check --pilot” tells more")
+    assert found == [
+        ("Simulate, in the tab Run", "chamberopt simulate"),
+        " predicts it; “",
+        ("a check with pilot runs, in a terminal", "chamberopt check --pilot"),
+        "” tells more",
+    ]
 
 
 def test_terms_in_html_are_explained_outside_tags_and_drawings() -> None:

@@ -164,8 +164,15 @@ def test_a_section_shows_the_inside_of_the_part(shown: OpenPage) -> None:
 
 def test_the_chamber_can_be_hidden_and_folded_text_opens(shown: OpenPage) -> None:
     before = shown.pixels()
-    shown.page.uncheck("#glass")
+    chamber, wall = (
+        shown.page.get_by_label("show the chamber"),
+        shown.page.locator("#kinds [data-kind=wall]"),
+    )
+    chamber.uncheck()
     assert np.abs(shown.pixels() - before).max() > 0.05
+    expect(wall).to_have_attribute("aria-pressed", "false")
+    wall.click()  # the legend and the switch are one
+    expect(chamber).to_be_checked()
     fold = shown.page.locator("details", has_text="best.toml").last
     assert not fold.locator("pre").is_visible()
     fold.locator("summary").click()

@@ -81,23 +81,27 @@ def test_the_report_says_the_range_beside_the_interval(folder: Path) -> None:
     document = report(load_result(folder))
     (line,) = [one.text for one in document.answer_lines if one.about == "ranges"]
     assert line.startswith(
-        "Not calibrated: v0 (0.5 to 2 times). Over their ranges the mean coverage of the target is "
+        "Not calibrated: the yield speed (0.5 to 2 times). Over their ranges the mean coverage of "
+        "the target is "
     )
     assert line.endswith(
-        " %; what would narrow it most is v0 (100 % of it), by ball drops at 3 m/s on each surface "
-        "(chamberopt calibrate)."
+        " %; what would narrow it most is the yield speed (100 % of it), by ball drops at 3 m/s "
+        "on each surface (chamberopt calibrate)."
     )
     sections = {one.title: one for one in document.sections}
     assert sections["Coverage"].content[0].head[-1] == "range"
     figures, ends = sections["What is not calibrated"].content[1:3]
-    assert ends.head == ("", "v0, low", "v0, high")
+    assert ends.head == ("", "the yield speed, low", "the yield speed, high")
     row = dict((one[0], one) for one in figures.rows)["mean exposure, in times to 98 % coverage"]
     low, high = (float(one) for one in row[2].split(" to "))
     assert (low, high) == pytest.approx((0.5 * 2.0 * low, 4.0 * low), rel=0.1)
-    assert row[3] == "v0 100 %"
+    assert row[3] == "the yield speed 100 %"
     numbers = {one[0]: one[1:] for one in sections["What is not calibrated"].content[3].rows}
     assert numbers["materials.wall.v0_m_s"] == ("0.44", "0.22", "0.88")
-    assert "The ranges hold what is not calibrated: v0." in sections["The answer"].content[-1].text
+    assert (
+        "The ranges hold what is not calibrated: the yield speed."
+        in sections["The answer"].content[-1].text
+    )
 
 
 def test_the_sheet_says_the_time_at_the_slow_end(folder: Path) -> None:
@@ -113,7 +117,7 @@ def test_the_sheet_says_the_time_at_the_slow_end(folder: Path) -> None:
     there = [text for text in cautions(replace(result, design=planned)) if "slow end" in text]
     assert there == [
         "The peening time is enough as designed, but not at the slow end of what is not calibrated "
-        f"(v0): there 95 % of the target's area is 98 % covered after: {text}."
+        f"(the yield speed): there 95 % of the target's area is 98 % covered after: {text}."
     ]
     ample = result.design.changed({"process.treatment_time_s": 3.0 * time.value})
     assert not [one for one in cautions(replace(result, design=ample)) if "slow end" in one]
@@ -187,7 +191,9 @@ def test_a_study_says_whether_its_best_stays_best(
     monkeypatch.setattr("chamberopt.workflows.ranges.simulate_ends", ends)
     found = study_ranges(result, SerialExecutor(), teller)
     assert found is not None
-    assert told[0].startswith("v0: not calibrated, so 4 more replicas of each of 2 designs are ")
+    assert told[0].startswith(
+        "the yield speed: not calibrated, so 4 more replicas of each of 2 designs are "
+    )
     (rival,) = found.rivals
     assert (rival.rival, len(rival.gains)) == ("start", 2)
     gain = result.best.design.shot.mass_g - result.start.design.shot.mass_g
@@ -197,7 +203,7 @@ def test_a_study_says_whether_its_best_stays_best(
     read = load_result(tmp_path)
     assert read.study.at_ends == [rival]
     assert load_result(tmp_path / "start").record.ranges == found.start
-    sentence = "The best design stays better than the start at both ends of v0."
+    sentence = "The best design stays better than the start at both ends of the yield speed."
     assert sentence in [one.text for one in report(read).answer_lines]
     said = result_end(tmp_path, verbose=False)
     assert sentence in said

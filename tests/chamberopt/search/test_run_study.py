@@ -434,8 +434,11 @@ def test_a_second_round_adds_replicas_to_those_of_a_chamber_that_is_gone(monkeyp
     design = plate_design(**short)
     other = design.changed({"chamber.height_mm": design.value("chamber.height_mm") + 1})
     question = Study(design=design, vary={"chamber.height_mm": (19.0, 60.0)})
-    simulator, anew = (ChamberSimulator(question, SerialExecutor(), None) for _ in range(2))
+    anew = ChamberSimulator(question, SerialExecutor(), None)
+    told: list = []
+    simulator = ChamberSimulator(question, SerialExecutor(), None, lambda *now: told.append(now))
     simulator(design, "confirm", 2)
+    assert told[-1] == (2, 2, None)  # replicas
     simulator(other, "confirm", 2)
     assert [one() is None for one in built] == [True, False]
     again, once = simulator(design, "confirm", 4), anew(design, "confirm", 4)

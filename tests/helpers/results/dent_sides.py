@@ -54,6 +54,6 @@ if __name__ == "__main__":
         if given["plain"]:
             dent_map.AMBIENT, dent_map.MIN_RIM_PIXELS = 1.0, np.inf
         for number, view in enumerate(given["views"]):
-            side = dent_map.render_side(part, discs, tuple(view), int(given["pixels"]))
+            side = dent_map.render_side(part, discs, tuple(view), int(given["pixels"]), "black")
             found |= {f"image_{number}": side.image, f"pixel_mm_{number}": side.pixel_mm}
     np.savez(folder / "sides.npz", **found)

@@ -1,9 +1,12 @@
-// The tools of views in 3D: a section with its slider, measuring, and the legend of the kinds that are there.
+// The tools of views in 3D: a section with its slider, measuring, sides to look from, and the legend of the kinds that
+// are there, each of which can be hidden.
 "use strict";
 class Tools {
+  static CHAMBER = ["wall", "sonotrode", "holder", "mask"]; // kinds that are no part
   // Names of views, and the way from what is looked at to the eye. A little aside, as z is up.
-  static WAYS = [["from the front, along y", [0, -1, 0]], ["from the back", [0, 1, 0]], ["from the right, along -x", [1, 0, 0]],
-    ["from the left", [-1, 0, 0]], ["from above", [0, -1e-4, 1]], ["from below", [0, -1e-4, -1]]];
+  static WAYS = { Front: [[0, -1, 0], "along y"], Back: [[0, 1, 0], "against y"], Left: [[-1, 0, 0], "along x"],
+    Right: [[1, 0, 0], "against x"], Top: [[0, -1e-4, 1], "from above"], Bottom: [[0, -1e-4, -1], "from below"],
+    Isometric: [[1, -1, 1], "from a corner"], Fit: [undefined, "all that is shown, from where the eye is"] };
   #cut = { normal: [0, -1, 0], low: -1, high: 1 };
   #isFlipped = false;
 
@@ -23,19 +26,21 @@ class Tools {
     this.at = make("input", { type: "number", step: "any", ariaLabel: "place of the section in mm" });
     this.flip = make("button", { textContent: "Flip", title: "show the other side" });
     this.told = make("output", {});
-    this.from = make("select", { title: "where to look from", ariaLabel: "view" },
-      ...[["", "View"], ["first", "as at first"], ...Tools.WAYS.map(([name], k) => [k, name])].map(([value, textContent]) => make("option", { value, textContent })));
+    this.from = make("span", { className: "joined", role: "group", ariaLabel: "view" }, ...Object.entries(Tools.WAYS).map(([textContent, [way, title]]) => {
+      const button = make("button", { textContent, title });
+      button.addEventListener("click", () => { for (const view of this.views) view.from(way); });
+      return button;
+    }));
+    this.chamber = make("input", { type: "checkbox", checked: true });
+    this.chamber.addEventListener("change", () => this.#hide(Tools.CHAMBER, !this.chamber.checked));
+    const chamber = make("label", { hidden: true }, this.chamber, " show the chamber");
     this.controls = make("span", { hidden: true, className: "cut" }, this.by, this.slider, make("label", {}, this.at, " mm"), this.flip);
-    this.element = make("div", { className: "tools" }, this.section, this.measure, this.controls, this.from, this.told);
+    this.element = make("div", { className: "tools" }, this.section, this.measure, this.from, chamber, this.controls, this.told);
     this.ruler = new Measure(views, (text) => { this.told.textContent = text; });
     for (const button of [this.section, this.measure]) button.setAttribute("aria-pressed", "false");
     this.section.addEventListener("click", () => this.#turn(this.section.ariaPressed !== "true"));
     this.measure.addEventListener("click", () => this.#measure(this.measure.ariaPressed !== "true"));
     this.by.addEventListener("change", () => this.#begin());
-    this.from.addEventListener("change", () => {
-      for (const view of this.views) view.from(Tools.WAYS[this.from.value]?.[1]);
-      this.from.value = ""; // the view may be turned by hand after this
-    });
     this.slider.addEventListener("input", () => { this.at.value = this.slider.value; this.#apply(); });
     this.at.addEventListener("input", () => { this.slider.value = this.at.value; this.#apply(); });
     this.flip.addEventListener("click", () => { this.#isFlipped = !this.#isFlipped; this.#apply(); });
@@ -99,34 +104,45 @@ class Tools {
   }
 
   // A button that hides the surfaces of a kind in all views, and shows them again.
-  static #hider(views, kind, ...inner) {
-    const button = document.createElement("button");
+  #hider(kind, ...inner) {
+    const button = Object.assign(document.createElement("button"), { title: "hide it, or show it again" });
+    button.dataset.kind = kind;
     button.append(...inner);
-    button.title = "hide it, or show it again";
-    const show = () => { button.ariaPressed = String(!views[0].hides(kind)); };
-    button.addEventListener("click", () => {
-      const isHidden = !views[0].hides(kind);
-      for (const view of views) view.hide(kind, isHidden);
-      show();
-    });
-    show();
+    button.addEventListener("click", () => this.#hide([kind], !this.views[0].hides(kind)));
     return button;
   }
 
-  // Write the kinds that views have now into a list, and keep it so.
-  static legend(list, views, kinds) {
-    const now = views.map(() => []);
-    views.forEach((view, i) => {
+  #hide(kinds, isHidden) {
+    for (const view of this.views) for (const kind of kinds) view.hide(kind, isHidden);
+  }
+
+  // Write the kinds that the views have now into a list, and keep it so.
+  legend(list, kinds) {
+    const now = this.views.map(() => []);
+    let listed = null;
+    this.views.forEach((view, i) => {
       view.kinds = kinds;
       view.hearKinds((names) => {
         now[i] = names;
-        list.replaceChildren(...Object.entries(kinds).filter(([name]) => now.flat().includes(name)).map(([name, [label, colour]]) => {
-          const item = document.createElement("li"), patch = document.createElement("i");
-          patch.style.background = colour;
-          item.append(...(views.some((one) => one.isSurface(name)) ? [Tools.#hider(views, name, patch, label)] : [patch, label]));
-          return item;
-        }));
+        const there = Object.keys(kinds).filter((name) => now.flat().includes(name));
+        if (there.join() !== listed) list.replaceChildren(...there.map((name) => this.#item(name, kinds[name])));
+        listed = there.join();
+        for (const button of list.querySelectorAll("button")) button.ariaPressed = String(!view.hides(button.dataset.kind));
+        this.#showSwitch(there.filter((name) => Tools.CHAMBER.includes(name)));
       });
     });
+  }
+
+  #item(name, [label, colour]) {
+    const item = document.createElement("li"), patch = document.createElement("i");
+    patch.style.background = colour;
+    item.append(...(this.views.some((one) => one.isSurface(name)) ? [this.#hider(name, patch, label)] : [patch, label]));
+    return item;
+  }
+
+  #showSwitch(there) {
+    const hidden = there.filter((kind) => this.views[0].hides(kind)).length;
+    this.chamber.parentElement.hidden = !there.length;
+    Object.assign(this.chamber, { checked: hidden < there.length, indeterminate: hidden > 0 && hidden < there.length });
   }
 }

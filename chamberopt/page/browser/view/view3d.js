@@ -85,9 +85,8 @@ class View3D {
     if (see) Object.assign(material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
     if (scale) geometry.setAttribute("uv", new THREE.BufferAttribute(new Float32Array(points.length / 3 * 2).fill(0.5), 2));
     const mesh = new THREE.Mesh(geometry, material);
-    Object.assign(mesh.userData, { kind, kinds: kind ? [kind] : [], open, points, index: triangles });
-    mesh.visible = !this.#hidden.has(kind);
-    return this.#keep(name, mesh);
+    Object.assign(mesh.userData, { kinds: kind ? [kind] : [], open, points, index: triangles });
+    return this.#keep(name, this.#along(kind, mesh));
   }
 
   // Colour each triangle of a surface; it then has three points of its own.
@@ -106,7 +105,9 @@ class View3D {
 
   // Colour a surface by values between 0 and 1 at its points, along a scale of colours "#rrggbb".
   paint(name, values, scale) {
-    const { mesh } = this.#meshes.get(name), uv = mesh.geometry.getAttribute("uv"), n = scale.length;
+    const mesh = this.get(name);
+    if (!mesh) return; // the view was given up before its colours came
+    const uv = mesh.geometry.getAttribute("uv"), n = scale.length;
     for (let i = 0; i < values.length; i++) uv.array[2 * i] = (0.5 + values[i] * (n - 1)) / n;
     uv.needsUpdate = true;
     if (mesh.userData.scale !== scale) {
@@ -118,19 +119,25 @@ class View3D {
     this.draw();
   }
 
-  // Replace lines: ends of one after the other, [x, y, z, x, y, z, ...].
-  lines(name, ends, colour) {
+  // Replace lines: ends of one after the other, [x, y, z, x, y, z, ...]. They are hidden with a kind of surfaces.
+  lines(name, ends, colour, kind = "") {
     this.remove(name);
     const geometry = new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(ends, 3));
-    return this.#keep(name, new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour })));
+    return this.#keep(name, this.#along(kind, new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour }))));
   }
 
-  // Replace texts: [text, [x, y, z]] each. They are as large near as far.
-  texts(name, texts) {
+  // Replace texts: [text, [x, y, z]] each. They are as large near as far, and are hidden with a kind of surfaces.
+  texts(name, texts, kind = "") {
     this.remove(name);
     const group = new THREE.Object3D();
     for (const [text, at] of texts) group.add(View3D.textOf(text, at, TEXT_HEIGHT, undefined, true));
-    return this.#keep(name, group);
+    return this.#keep(name, this.#along(kind, group));
+  }
+
+  #along(kind, mesh) {
+    mesh.userData.kind = kind;
+    mesh.visible = !this.#hidden.has(kind);
+    return mesh;
   }
 
   #keep(name, mesh) {
@@ -190,7 +197,7 @@ class View3D {
   // Call with each click into the view that no tool takes.
   hearClicks(hear) { this.#clicked.push(hear); }
 
-  // Call with the kinds that are to be seen, now and whenever they are others.
+  // Call with the kinds that are there, now and whenever they are others, or others are hidden.
   hearKinds(hear) {
     this.#kinds = { now: "", hear };
     this.draw();
@@ -273,10 +280,12 @@ class View3D {
     this.draw();
   }
 
-  // Look along a way [x, y, z], with z up, at what the view looked at first; from the first eye without one.
-  from(way) {
-    const { middle, eye, size } = this.home, far = Math.hypot(...eye.map((x, i) => x - middle[i]));
-    this.#aim({ middle, size, eye: way ? middle.map((x, i) => x + far * way[i]) : eye });
+  // Look at all surfaces that are to be seen, from the side to which a way [x, y, z] leads, by default from where the eye is.
+  from(way = this.camera.position.clone().sub(this.orbit.target).toArray()) {
+    const { low, high } = this.extent(), size = Math.hypot(...high.map((x, i) => x - low[i]));
+    if (!Number.isFinite(size)) return; // nothing is to be seen
+    const middle = low.map((x, i) => (x + high[i]) / 2), far = 2.2 * size * Math.max(1, 1 / this.camera.aspect) / Math.hypot(...way);
+    this.#aim({ middle, size, eye: middle.map((x, i) => x + far * way[i]) });
   }
 
   // Turn as another view does.
@@ -325,7 +334,7 @@ class View3D {
   #tellKinds() {
     const isThere = ({ visible, userData }) => visible || this.#hidden.has(userData.kind);
     const there = this.all().filter(([, mesh]) => isThere(mesh)).flatMap(([, mesh]) => mesh.userData.kinds ?? []);
-    const kinds = [...new Set([...there, ...this.section.kinds()])], now = kinds.sort().join();
+    const kinds = [...new Set([...there, ...this.section.kinds()])], now = [...kinds.sort(), "", ...this.#hidden].join();
     if (!this.#kinds.hear || now === this.#kinds.now) return;
     this.#kinds.now = now;
     this.#kinds.hear(kinds);

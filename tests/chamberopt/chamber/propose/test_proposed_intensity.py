@@ -209,7 +209,7 @@ def test_what_is_written_loads_and_has_the_band_beside_the_value(
     made = propose_intensity(bare, wanted, far, lambda _: bare, Machine(2.0e-3).simulate)
     reason = made.reasons["process.intensity_mmA"]
     assert "it takes an amplitude of about" in reason
-    assert "x/÷ 2.5" in reason
+    assert "within a factor of 2.5" in reason
     (tmp_path / "design.toml").write_text(design_text(made, tmp_path))
     design = load_design(tmp_path / "design.toml")
     assert design.process.intensity_mmA == (1.0, 1.2)
@@ -328,7 +328,7 @@ def test_without_a_wish_the_expected_intensity_stands_beside_the_usual_one(
     assert "not known" in with_expected_intensity(made, None).reasons[INTENSITY]
     predicted = PredictedIntensity(0.31, 0.05, 1.9, 2.5)
     told = with_expected_intensity(made, predicted).reasons[INTENSITY]
-    assert "expected 0.31 mmA x/÷ 2.5; OUTSIDE THE USUAL RANGE, 0.15-0.25A, usual for tit" in told
+    assert "expected 0.31 mmA, within a factor of 2.5; OUTSIDE THE USUAL RANGE, 0.15-0.25A, " in told
     for value, beside in ((0.2, False), (0.26, True)):
         near = with_expected_intensity(made, PredictedIntensity(value, 0.05, 1.9, 2.5))
         assert "0.15-0.25A are usual for titanium of 8 mm" in near.reasons[INTENSITY]
@@ -368,7 +368,7 @@ def test_a_usual_intensity_is_aimed_at_and_is_no_wish(plate: Path, shop: Shop) -
 def test_a_weak_intensity_stands_on_n_strips_too(plate: Path, shop: Shop) -> None:
     made = propose(plate, Wanted("mm", shop=shop), lambda _: [])
     told = with_expected_intensity(made, PredictedIntensity(0.06, 0.01, 0.36, 2.5))
-    assert "0.06 mmA x/÷ 2.5 (0.18 mm on N strips)" in told.reasons[INTENSITY]
+    assert "0.06 mmA, within a factor of 2.5 (0.18 mm on N strips)" in told.reasons[INTENSITY]
 
 
 @pytest.mark.parametrize("metal", ["IN718", "Ti-6Al-4V"])

@@ -1,0 +1,75 @@
+"""Tell how long a run will take, by how long the latest run of a like design took."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from chamberopt.common.errors import InputError
+from chamberopt.common.toml_fields import read_toml
+from chamberopt.design.design import Design
+from chamberopt.design.load import is_study, load_design
+from chamberopt.results.load import Result, load_result
+from chamberopt.search.ask_and_tell import most_evaluations
+from chamberopt.search.study import load_study
+
+ROUND_S, LONG_S = 5, 90  # shorter times are told in steps of seconds, longer ones in minutes
+MINUTE, HOUR = 60, 3600
+
+
+def duration_in_words(path: Path, results: Iterable[Path]) -> str:
+    """Return how long a design or study will take, such as "about 2 minutes"; "" if unknown.
+
+    Args:
+        path: file of the design or study.
+        results: folders of results, the newest first.
+    """
+    evaluations = 1
+    if is_study(read_toml(path, "design")[1]):
+        study = load_study(path)
+        design, evaluations = study.at_search_accuracy(study.design), most_evaluations(study)
+    else:
+        design = load_design(path)
+    for folder in results:
+        with suppress(InputError):
+            result = load_result(folder)
+            if _is_like(design, result.design):
+                return _in_words(evaluations * _seconds(design, result))
+    return ""
+
+
+def _is_like(one: Design, other: Design) -> bool:
+    """Return whether two designs have the same part in a chamber of the same shape."""
+    return _form(one) == _form(other)
+
+
+def _form(design: Design) -> tuple[str, str]:
+    return design.part.mesh_path.name, design.chamber.shape
+
+
+def _seconds(design: Design, result: Result) -> float:
+    """Return the time [s] that a design takes, by that of a result.
+
+    It grows with the balls and with the simulated time of all replicas. A design that is simulated
+    until it is as sure as the result takes as many replicas.
+    """
+    wanted, then = (one.process.accuracy for one in (design, result.design))
+    replicas = result.record.replicas
+    is_as_sure = wanted.objective_half_width == then.objective_half_width is not None
+    effort = _balls_s(design) * (replicas if is_as_sure else wanted.replicas)
+    return sum(result.record.timings_s.values()) * effort / (_balls_s(result.design) * replicas)
+
+
+def _balls_s(design: Design) -> float:
+    """Return the balls of a replica times its simulated time [s]."""
+    process = design.process
+    return design.shot.count * (process.recorded_time + process.accuracy.warmup_time)
+
+
+def _in_words(seconds: float) -> str:
+    if seconds < LONG_S:
+        return f"about {max(1, round(seconds / ROUND_S)) * ROUND_S} s"
+    if seconds < 1.5 * HOUR:
+        return f"about {round(seconds / MINUTE)} minutes"
+    return f"about {seconds / HOUR:.2g} hours"
