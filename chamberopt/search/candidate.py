@@ -50,7 +50,7 @@ class Candidate:
     point: np.ndarray  # place in the unit cube, (d,)
     space: ParameterSpace = field(repr=False)
     replicas: int | None = None  # that a confirmation gets; by default as the design says
-    # Number of replicas after which it ends if more would bring nothing; None if it gets all.
+    # Number of replicas after which it ends if these are enough; None if it gets all.
     first: int | None = None
     # Lower end of the best objective's interval so far: a candidate of a search that is clearly
     # below it is not worth more replicas.
@@ -233,16 +233,21 @@ class CandidateEvaluator:
         return self._simulate(design, stream, candidate.replicas)
 
     def _tells_enough(self, candidate: Candidate, found: Evaluation) -> bool:
-        """Return whether more replicas of a candidate would tell nothing that the study asks for.
+        """Return whether a candidate needs no more replicas than its first.
 
-        In a search this is so for a candidate that is clearly worse than the best, too.
+        In a search this is so if it is clearly worse than the best, or if what is asked of it has
+        an interval: the model of the scores takes noise, and further candidates tell it more than
+        further replicas do (benchmarks/optimizers.py: ours against ours-sure). In a confirmation it
+        is so if more would tell nothing that the study asks for.
         """
         if candidate.bar is not None and found.objective.high < candidate.bar:
             return True
         figures = simulated_figures(self._study, candidate, found)
         limits = self._study.all_constraints
         limited = limited_figures(self._study, candidate, figures)
-        if candidate.stage == "confirm" and not found.resolution.has_places:
+        if candidate.stage == "search":
+            return all(one.has_number for one in (*figures.goals, *limited.values()))
+        if not found.resolution.has_places:
             return False
         is_known = assess_feasibility(limits, limited)[0] != NOT_KNOWN
         return is_known and not any(map(narrows, figures.goals))

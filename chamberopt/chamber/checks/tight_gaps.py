@@ -45,14 +45,14 @@ def tight_gaps(chamber: Chamber, diameters: Sequence[float]) -> Iterator[TightGa
     free = (touches.radius >= 0.5 * largest) & (gaps.width > JAM_BAND[1] * largest)
     if not (len(tight) and free.any()):
         return
-    mouths = KDTree(touches.centre[free])
+    mouths, near = KDTree(touches.centre[free]), largest + gaps.spacing
     for members in clusters(touches.centre[tight], 2.0 * gaps.spacing):
         gap = touches.select(tight[members])
         sides = sides_of_gap(gap, names)
         small = gap.area.sum() < MIN_AREA * largest**2
         if small or not {CEILING, SIDE_WALL, SONOTRODE}.intersection(sides):
             continue
-        if mouths.query(gap.centre)[0].min() <= largest + gaps.spacing:
+        if np.isfinite(mouths.query(gap.centre, distance_upper_bound=near)[0]).any():
             low, high = (1e3 * end(gaps.width[tight[members]]) for end in (np.min, np.max))
             one, two = sides
             yield TightGap(

@@ -52,6 +52,10 @@ SPREAD_SHARE, SPREAD_PER_PARAMETER = 0.3, 2
 ROUGH_STEP_INTERVAL, ROUGH_LENGTH_FACTOR = 4, 0.5
 # First steps of the local searches from the best point so far, as factors of the initial step.
 LOCAL_STEP_FACTORS = (1.0, 0.5, 0.25)
+# What the model proposes and geometry refuses costs nothing. It is pulled back to the middle of it
+# and the best point, up to so many times, until it can be simulated: the best often lies at the
+# edge of what can be built, which the model knows less sharply.
+HALVINGS = 3
 ROUNDING = 1e-9  # of a sum of costs
 
 Observe = Callable[[], Observations]
@@ -195,11 +199,20 @@ class PointSearch:
     def _follow_model(self, limit: int) -> Wait:
         if not self.scores:
             yield from self._wait()
+        halvings: dict[int, int] = {}  # that are left, by the position of a point of this phase
         while True:
             yield from self._wait(self._settings.batch - 1)
             if not (yield from self._left(limit)):
                 return
             seen, points = self._observe(), np.array(self.points)
+            refused = [k for k in halvings if k < len(seen.scores) and not seen.simulated[k]]
+            if refused:
+                left = halvings.pop(refused[-1]) - 1
+                best = points[np.argmax(np.where(seen.simulated, seen.scores, -np.inf))]
+                middle = self._snapped(0.5 * (points[refused[-1]] + best))
+                if left >= 0 and middle.tobytes() not in self._numbers:
+                    halvings[(yield from self._evaluate(middle, self._budget))] = left
+                    continue
             if np.ptp(seen.scores[seen.simulated]) == 0.0:  # nothing to learn
                 point = self._snapped(self._rng.random(len(self._domain)))
             else:
@@ -209,7 +222,7 @@ class PointSearch:
                 if not is_rough:
                     self._require_gain(model, seen)
                 point = propose_point(model, self._rng)
-            yield from self._evaluate(point, self._budget)
+            halvings[(yield from self._evaluate(point, self._budget))] = HALVINGS
 
     def _require_gain(self, model: SearchModel, seen: Observations) -> None:
         """Raise SearchEndedError if nothing is left to gain that counts.

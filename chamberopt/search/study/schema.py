@@ -166,7 +166,7 @@ class Optimizer(FileTable):
         0,
         100000,
         "",
-        "after which a candidate gets no more if more would tell nothing; 0: never",
+        "of a candidate, which gets all only if these do not tell its figures; 0: all to each",
         3,
     )
     confirm_rounds: int = quantity(
@@ -267,16 +267,14 @@ class Study(FileTable, ShownInNotebook):
 
     @property
     def first_look(self) -> int | None:
-        """Number of replicas after which a candidate of the search gets no more if more would tell
-        nothing: it is clearly worse, or what is not known of it is in all replicas.
+        """Number of replicas that a candidate of the search gets if they tell its figures.
 
-        It is None if each candidate gets all replicas: with two objectives, or if the design asks
-        for an accuracy of the objective, or if the study sets no such number.
+        It is None if each candidate gets all replicas: if these are no more, or if the study says
+        so or asks for an accuracy of the search.
         """
-        accuracy = self.at_search_accuracy(self.design).process.accuracy
-        few = self.optimizer.first_replicas
-        refines = len(self.objective.goals) == 1 and accuracy.objective_half_width is None
-        return few if refines and 0 < few < accuracy.replicas else None
+        few, accuracy = self.optimizer.first_replicas, self.at_search_accuracy(self.design)
+        is_asked = "objective_half_width" in self.search_accuracy
+        return few if 0 < few < accuracy.process.accuracy.replicas and not is_asked else None
 
     @property
     def first_look_of_confirmation(self) -> int | None:

@@ -37,7 +37,9 @@ def test_scores_suit_objectives_of_any_size(tmp_path: Path) -> None:
     assert bowl(bowl_shares(result.best.design)) > 0.79
 
 
-def test_the_plainly_bad_get_few_replicas_and_close_calls_more(tmp_path: Path) -> None:
+def test_a_search_takes_few_replicas_and_a_confirmation_more_for_close_calls(
+    tmp_path: Path,
+) -> None:
     asked: list[tuple[str, int | None]] = []
     progress: list[tuple[int, int, float | None]] = []
 
@@ -52,9 +54,8 @@ def test_the_plainly_bad_get_few_replicas_and_close_calls_more(tmp_path: Path) -
     result = run_bowl(tmp_path, simulator, settings, progress=told)
     assert_total_never_grows(progress)
     searched = [one for one in read_trials(tmp_path) if one.stage == "search"]
-    assert {one.replicas for one in searched} == {4, 8}
-    bar = max(t.objective.low for t in result.trials if t.stage == "search")
-    assert all(one.objective.value < bar for one in searched if one.replicas == 4)
+    assert [one.replicas for one in searched] == [8, *[4] * (len(searched) - 1)]
+    assert len(searched) > 12  # they cost less than a whole evaluation
     confirmed = [replicas for stream, replicas in asked if stream == "confirm"]
     assert confirmed[:3] == [4, 4, 4]
     assert 8 in confirmed
@@ -62,7 +63,7 @@ def test_the_plainly_bad_get_few_replicas_and_close_calls_more(tmp_path: Path) -
     assert len(best) == len(start) == max(confirmed)  # pair by pair, as the gain needs
 
 
-def test_candidates_end_early_where_more_replicas_would_tell_nothing(tmp_path: Path) -> None:
+def test_confirmations_end_early_where_more_replicas_would_tell_nothing(tmp_path: Path) -> None:
     """Above half of the bounds nearly all of the interval is in all replicas, below nothing."""
     asked: list[tuple[str, int, bool]] = []
 
@@ -74,14 +75,25 @@ def test_candidates_end_early_where_more_replicas_would_tell_nothing(tmp_path: P
         return replace(made, objective=estimate(made.objective.pseudovalues, shared=shared))
 
     settings = {"first_replicas": 4, "confirm_replicas": 16, "evaluations": 12}
-    result = run_bowl(tmp_path, simulator, settings)
+    run_bowl(tmp_path, simulator, settings)
     assert {count for stream, count, high in asked if high and stream == "confirm"} <= {4}
+    assert {count for stream, count, high in asked if not high and stream == "confirm"} == {4, 16}
+
+
+def test_what_few_replicas_do_not_tell_gets_all(tmp_path: Path) -> None:
+    """Above half of the bounds four replicas tell no number, and eight do."""
+
+    def simulator(design, stream, replicas):
+        count, high = replicas or design.process.accuracy.replicas, bowl_shares(design)[0] > 0.5
+        made = judged(bowl(bowl_shares(design)) + 0.001 * np.resize([-1.0, 1.0], count))
+        if high and count < 8:
+            made = replace(made, objective=made.objective.not_known("not resolved"))
+        return made
+
+    result = run_bowl(tmp_path, simulator, {"first_replicas": 4, "evaluations": 12})
     searched = [one for one in result.trials if one.stage == "search"][1:]  # the start gets all
-    early = [one for one in searched if one.replicas == 4]
-    assert result.ended_early == len(early) > 0
-    assert len(searched) > 11  # they cost less than a whole evaluation
-    assert all(one.replicas == 4 for one in searched if one.point[0] > 0.5)
-    assert any(one.replicas == 8 for one in searched)
+    assert all(one.replicas == (8 if one.point[0] > 0.5 else 4) for one in searched)
+    assert result.ended_early == sum(one.replicas == 4 for one in searched) > 0
 
 
 def test_a_search_ends_where_nothing_is_left_to_gain(tmp_path: Path) -> None:

@@ -328,7 +328,9 @@ def test_without_a_wish_the_expected_intensity_stands_beside_the_usual_one(
     assert "not known" in with_expected_intensity(made, None).reasons[INTENSITY]
     predicted = PredictedIntensity(0.31, 0.05, 1.9, 2.5)
     told = with_expected_intensity(made, predicted).reasons[INTENSITY]
-    assert "expected 0.31 mmA, within a factor of 2.5; OUTSIDE THE USUAL RANGE, 0.15-0.25A, " in told
+    assert (
+        "expected 0.31 mmA, within a factor of 2.5; OUTSIDE THE USUAL RANGE, 0.15-0.25A, " in told
+    )
     for value, beside in ((0.2, False), (0.26, True)):
         near = with_expected_intensity(made, PredictedIntensity(value, 0.05, 1.9, 2.5))
         assert "0.15-0.25A are usual for titanium of 8 mm" in near.reasons[INTENSITY]

@@ -9,6 +9,7 @@ import pytest
 from chamberopt.common.errors import InputError
 from chamberopt.search.optimiser.domain import Axis, Domain
 from chamberopt.search.optimiser.point_search import PointSearch
+from chamberopt.search.optimiser.search_model import Observations
 from chamberopt.search.study.schema import Optimizer
 from tests.helpers.known_optima import PEAK, bowl, hill
 
@@ -136,6 +137,38 @@ def test_what_cannot_be_simulated_costs_nothing() -> None:
     maximise(lambda x: lambda: (hill(x), float(bool(simulated.append(False)))),
              np.full(3, 0.4), Optimizer(evaluations=6))  # fmt: skip
     assert len(simulated) == 12  # nowhere: it ends
+
+
+def test_what_geometry_refuses_is_pulled_back_to_the_best_point() -> None:
+    """The peak lies beyond an edge: after a proposal there follow middles, up to three."""
+    points: list[np.ndarray] = []
+    scores: list[float] = []
+
+    def stands(point: np.ndarray) -> bool:
+        return bool(point[0] - point[1] < 0.3)
+
+    def score(point: np.ndarray) -> float:
+        return 1.0 - (point[0] - 0.9) ** 2 - (point[1] - 0.2) ** 2 if stands(point) else -1.0
+
+    def seen() -> Observations:
+        there = np.array([stands(one) for one in points[: len(scores)]])
+        return Observations(np.array(scores), np.zeros(len(scores)), there, by_geometry=True)
+
+    def begin(point: np.ndarray) -> Callable[[], tuple[float, ...]]:
+        points.append(point)
+        return lambda: (scores.append(score(point)) or scores[-1], float(stands(point)))
+
+    start, settings = np.array([0.4, 0.6]), Optimizer(evaluations=16, batch=1, seed=3)
+    maximise(begin, start, settings, seen)
+    refused = [k for k, one in enumerate(points[:-1]) if k > 6 and not stands(one)]
+    assert refused
+    halved = 0
+    for k in refused:
+        best = max(filter(stands, points[: k + 1]), key=score)
+        is_middle = np.allclose(points[k + 1], 0.5 * (points[k] + best), atol=1e-9)
+        assert is_middle or halved == 3
+        halved = halved + 1 if is_middle and k + 1 in refused else 0
+    assert max(scores) > 0.95 * score(np.array([0.7, 0.4 + 1e-9]))
 
 
 def test_what_costs_a_part_of_an_evaluation_leaves_room_for_others() -> None:

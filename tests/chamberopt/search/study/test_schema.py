@@ -89,9 +89,9 @@ def test_how_well_a_design_is_known_is_none_of_its_choices() -> None:
         (3, {"replicas": 8}, {}, 3),
         (0, {"replicas": 8}, {}, None),
         (8, {"replicas": 8}, {}, None),
-        # As many as are enough for the accuracy, by chance or not, is no first look.
+        # An accuracy of the search is what each candidate gets.
         (10, {"replicas": 64, "objective_half_width": 0.01}, {}, None),
-        (3, {"replicas": 8}, {"pareto": ["uniform_coverage", "minus_time_to_98_s"]}, None),
+        (3, {"replicas": 8}, {"pareto": ["uniform_coverage", "minus_time_to_98_s"]}, 3),
     ],
 )
 def test_who_may_end_early(first: int, accuracy: dict, objective: dict, looks: int | None) -> None:
