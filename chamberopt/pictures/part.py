@@ -32,13 +32,13 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
 
 
-PLAIN, MARKED, MISSED, BEYOND = range(4)
+PLAIN, MARKED, MISSED, BEYOND, HELD = range(5)
 COLOURS = {
     state: (KINDS[name].colour, KINDS[name].label)
     for state, name in (
         (PLAIN, "rest"), (MARKED, "target"), (MISSED, "unreached"), (BEYOND, "outside"),
     )
-}  # fmt: skip
+} | {HELD: (KINDS["holder"].colour, "held outside the chamber")}  # fmt: skip
 # Restitution of a thin part over that of a rigid one, by bands, and their colours: greens, which
 # mean nothing else in the picture.
 BANDS = (0.5, 0.7, 0.9, 0.98)
@@ -51,6 +51,7 @@ BAND_COLOURS = {
     4: ("#c7e9c0", "0.9 to 0.98"),
     5: (BLUE, "0.98 and more"),
 }
+CLEAR = 0.05  # mm: what stands out of the room by less does not
 ALL = 0.999  # share of the target's area from which it is wholly in the chamber
 OPPOSITE = np.array([(1.0, -1.6, 0.7), (-1.0, 1.6, -0.7)])
 
@@ -68,8 +69,16 @@ def draw_target(design: Design, chamber: Chamber, screenshot: Path) -> str:
     hidden = part.target & (touched(design, chamber) <= 0.5)
     missed = without_specks(part, hidden, min(design.shot.diameters))
     corners = part.vertices[part.triangles]
-    more = {"missed": missed, "softness": softness_of_part(design, part)}
-    remark = draw_part(corners, part.name, screenshot, part.target, chamber=chamber, **more)
+    remark = draw_part(
+        corners,
+        part.name,
+        screenshot,
+        part.target,
+        missed=missed,
+        chamber=chamber,
+        softness=softness_of_part(design, part),
+        is_held_outside=design.holder is not None and design.holder.kind == "bore",
+    )
     return remark or f"picture in {screenshot}"
 
 
@@ -82,6 +91,7 @@ def draw_part(
     missed: np.ndarray | None = None,
     chamber: Chamber | None = None,
     softness: np.ndarray | None = None,
+    is_held_outside: bool = False,
 ) -> str | None:
     """Draw a part with its target in its chamber, or with its faults.
 
@@ -95,6 +105,7 @@ def draw_part(
         chamber: the chamber, drawn as glass round the part in a further view, with dimensions.
         softness: restitution of the part over that of a rigid one, shape (n,), where it is thin.
             A second row of views shows it on the target.
+        is_held_outside: True if the part is clamped where it stands out of the chamber.
     Returns:
         None, or one line that says why there is no picture.
     Raises:
@@ -105,7 +116,8 @@ def draw_part(
     marked, missed = (none if chosen is None else chosen for chosen in (marked, missed))
     edges = np.zeros((0, 2, 3)) if edges is None else edges
     job = {"title": title, "corners": corners * MM, "marked": marked & ~missed, "missed": missed,
-           "edges": edges * MM, "chamber": chamber, "softness": softness}  # fmt: skip
+           "edges": edges * MM, "chamber": chamber, "softness": softness,
+           "is_held_outside": is_held_outside}  # fmt: skip
     return draw_in_subprocess(render_part, job, path)
 
 
@@ -159,6 +171,10 @@ def _coloured(
     outside = kinds
     if beyond:
         outside = np.where(kinds == PLAIN, PLAIN, BEYOND if there < ALL * whole else MARKED)
+        if job["is_held_outside"]:
+            low, high = np.reshape(chamber.bounds, (3, 2)).T
+            stands_out = ((corners < low - CLEAR) | (corners > high + CLEAR)).any(axis=(1, 2))
+            outside[stands_out & (outside == PLAIN)] = HELD
     return part, [(part, outside), (inside, own)]
 
 

@@ -7,8 +7,11 @@ import pytest
 import trimesh
 from matplotlib.image import imread
 
+from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
-from chamberopt.pictures.part import draw_part
+from chamberopt.design.load import load_design
+from chamberopt.pictures.part import CLEAR, HELD, MARKED, PLAIN, _coloured, draw_part
+from chamberopt.results.vtp_files import MM, cavity_surface
 from tests.helpers.opengl import needs_opengl
 
 
@@ -28,6 +31,21 @@ def test_a_part_is_drawn_with_its_target_or_with_its_fault_in_red(tmp_path: Path
     blue = [(picture[..., 2] - picture[..., 0] > 0.3).mean() for picture in (target, fault)]
     assert red[1] > 5e-4 > 10 * red[0]
     assert blue[0] > 0.05 > 10 * blue[1]
+
+
+@pytest.mark.parametrize("is_held", [False, True])
+def test_what_is_held_outside_is_marked_above_the_ceiling_alone(is_held: bool) -> None:
+    """The blade of the conformal chamber goes out through the ceiling; its target is inside."""
+    chamber = build_chamber(load_design("designs/blade_conformal.toml"))
+    part, room = chamber.part, cavity_surface(chamber)
+    corners = MM * part.vertices[part.triangles]
+    kinds = np.where(part.target, MARKED, PLAIN)
+    job = {"corners": corners, "chamber": room, "is_held_outside": is_held}
+    (_, outside), (_, inside) = _coloured(job, kinds)[1]
+    above = (corners[..., 2] > room.bounds[5] + CLEAR).any(axis=1) & ~part.target
+    assert above.any()
+    assert ((outside == HELD) == (above & is_held)).all()
+    assert HELD not in inside
 
 
 def test_a_part_is_drawn_only_where_there_can_be_such_a_file(tmp_path: Path) -> None:
