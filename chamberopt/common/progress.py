@@ -29,6 +29,7 @@ LEAST_PAUSE = 0.2  # s between JSON lines of a step
 _json_lines = _is_quiet = False
 # display on the terminal now, at most one: steps within steps share it
 _displays: list[Display] = []
+_counted = 0  # steps that run now and told a total at their beginning
 
 
 def write_json_lines() -> None:
@@ -69,9 +70,26 @@ def step(
 
     On a terminal the step has a line on stderr (or `stream`) from its beginning to its end, below
     the line of the step in whose `with` block it runs. In a Jupyter notebook the line is below the
-    cell. To a log or a pipe, a long step writes a plain line now and then.
+    cell. To a log or a pipe, a long step writes a plain line now and then. What runs within a step
+    of a known total tells no time left, and nothing to a log: the outer step does.
     """
-    stream = stream or sys.stderr
+    global _counted
+    stream, is_within = stream or sys.stderr, _counted > 0
+    _counted += total is not None
+    try:
+        with _shown(what, total, stream, is_within) as told:
+            yield told
+    finally:
+        _counted -= total is not None
+
+
+@contextmanager
+def _shown(what: str, total: int | None, stream: TextIO, is_within: bool) -> Iterator[Progress]:
+    """Show a step as `step` says.
+
+    Args:
+        is_within: True if it runs within a step of a known total.
+    """
     if _is_quiet:
         yield untold
         return
@@ -84,14 +102,15 @@ def step(
             _write_json({"step": what, "ended": True}, stream)
         return
     if not _displays and not stream.isatty() and not _is_notebook():
-        yield _log_lines(what, stream)
+        yield untold if is_within else _log_lines(what, stream)
         return
     with _display(stream) as display:
         row = display.add_task(what, total=None, count="", best="", left="")
+        update = partial(_update, display, row, is_within)
         if total is not None:
-            _update(display, row, 0, total, None)
+            update(0, total, None)
         try:
-            yield partial(_update, display, row)
+            yield update
         finally:
             display.refresh()
             display.remove_task(row)
@@ -113,10 +132,14 @@ def _is_notebook() -> bool:
     return Console().is_jupyter
 
 
-def _update(display: Display, row: Any, done: float, total: int, best: float | None) -> None:
+def _update(
+    display: Display, row: Any, is_within: bool, done: float, total: int, best: float | None
+) -> None:
     best_text = "" if best is None else f"best {best:.4f}"
-    count, left = (f"{int(done):,}/{total:,}", "left") if total else (f"{int(done):,} so far", "")
-    display.update(row, completed=done, total=total or None, count=count, best=best_text, left=left)
+    count = f"{int(done):,}/{total:,}" if total else f"{int(done):,} so far"
+    known = None if is_within else total or None
+    left = "left" if known else ""
+    display.update(row, completed=done, total=known, count=count, best=best_text, left=left)
 
 
 @contextmanager

@@ -148,7 +148,7 @@ WRONG = [
     Wrong("unknown algorithm", ('"auto"', '"BOBYQA"'), ("did you mean 'LN_BOBYQA'",), STUDY),
     Wrong(
         "no budget",
-        ("evaluations = 20", "evaluations = 0"),
+        ("evaluations = 14", "evaluations = 0"),
         ("evaluations: given 0", "from 2"),
         STUDY,
     ),
@@ -656,6 +656,19 @@ class TestProgress:
             "evaluations: 47 of 100, best 0.5000, about 265 s left",
             "evaluations: 95 of 100, best 0.5000, about 25 s left",
         ]
+
+    def test_a_log_has_no_lines_of_steps_within_a_counted_one(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        clock = [0.0]
+        monkeypatch.setattr("chamberopt.common.progress.time.monotonic", lambda: clock[0])
+        for total, told in ((None, True), (9, False)):
+            stream = io.StringIO()
+            with step("evaluations", total, stream=stream), step("replicas", stream=stream) as one:
+                for done in range(20):
+                    clock[0] += 5.0
+                    one(done, 20, None)
+            assert ("replicas: " in stream.getvalue()) is told
 
     def test_steps_within_steps(self, monkeypatch: pytest.MonkeyPatch) -> None:
         stream = io.StringIO()

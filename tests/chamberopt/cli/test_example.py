@@ -121,7 +121,7 @@ def test_a_fresh_environment_without_a_clone(wheel: Path, tmp_path: Path) -> Non
     assert "chamberopt run gear_study.toml" in run("chamberopt", "example", "gear")
     gear = tmp_path / "gear"
     study = gear / "gear_study.toml"
-    tiny = study.read_text(encoding="utf-8").replace("evaluations = 20", "evaluations = 3")
+    tiny = study.read_text(encoding="utf-8").replace("evaluations = 14", "evaluations = 3")
     study.write_text(tiny.replace("confirm_replicas = 8", "confirm_replicas = 3"), encoding="utf-8")
     assert "usable design" in run("chamberopt", "check", "gear.toml", folder=gear)
     run("chamberopt", "run", "gear_study.toml", folder=gear)
