@@ -21,6 +21,7 @@ from chamberopt.chamber.propose.proposed_intensity import (
     beside_larger,
     is_off,
     larger_balls,
+    larger_instead,
     propose_intensity,
     usual_for,
     with_expected_intensity,
@@ -260,6 +261,9 @@ class _Pilots:
             return with_thin_places(two)
         if larger is None or found is None:
             return _in_budget(without_finer(coarse[0], why), coarse[1])
+        if reason := larger_instead(made, found, *larger, asked):
+            reasons = {**coarse[0].reasons, "shot.diameter_mm": reason}
+            return _in_budget(replace(coarse[0], reasons=reasons), coarse[1])
         made = beside_larger(made, found, *larger, why)
         return _in_budget(*propose_second_pose(made, found, quietly))
 

@@ -7,11 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from chamberopt.chamber.propose.proposal import Proposal, Wanted
+from chamberopt.chamber.propose.proposal import Proposal, Wanted, new_harm
 from chamberopt.chamber.propose.proposed_balls import (
     AS_GOOD,
     DEEPEST,
     LARGEST_BALL,
+    MISSED,
+    MISSED_FILLETS,
     OF_THIN,
     THIN_SHARE,
     fit_sizes,
@@ -220,6 +222,36 @@ def beside_larger(
     )
     reasons = {**made.reasons, INTENSITY: f"{made.reasons[INTENSITY]}; {text}"}
     return replace(made, reasons=reasons)
+
+
+def larger_instead(
+    made: Proposal, found: Measured, other: Proposal, told: Measured, intensity: WantedIntensity
+) -> str:
+    """Return why larger balls are taken in the place of those that fit fillets and slots by rule.
+
+    They give the intensity, touch about as much, and cover the target no later by pilots. Else the
+    text is empty.
+
+    Args:
+        found: what a pilot measured of the proposal.
+        other, told: the proposal with larger balls, and what a pilot measured of it.
+    """
+    now, then = setting_of(made), setting_of(other)
+    here, there = fit_sizes(made.chamber.part, [1e-3 * now.ball_mm, 1e-3 * then.ball_mm])
+    gives = told.intensity is not None and not intensity.off(told.intensity.value)
+    gets_there = (
+        there.touched >= here.touched - MISSED and there.fillets >= here.fillets - MISSED_FILLETS
+    )
+    as_soon = told.places >= found.places and told.time_to_98 <= found.time_to_98
+    if not (gives and gets_there and as_soon) or new_harm(other, made):
+        return ""
+    return (
+        f"{LARGER}: they touch {there.touched:.0%} of the target and cover it no later by pilots, "
+        f"{told.in_words}, as {now.in_words} with {_about(found)} do, {found.in_words}. But "
+        f"{1.0 - there.served:.0%} of it lies in fillets of less than 2 or slots of less than 4 "
+        f"of their diameters, for which practice takes smaller ones (--ball-mm {now.ball_mm:g} "
+        "takes these)"
+    )
 
 
 def _about(found: Measured) -> str:

@@ -20,6 +20,7 @@ from chamberopt.chamber.propose.proposed_intensity import (
     beside_larger,
     is_off,
     larger_balls,
+    larger_instead,
     propose_intensity,
     usual_for,
     with_expected_intensity,
@@ -430,6 +431,19 @@ def test_where_balls_are_too_weak_the_next_larger_ones_are_told_beside_them(
     assert "% of the target touched, " in text
     assert "% served, 98 % after about 100 s, beside about 0.05 mmA, " in text
     assert text.endswith(", and both, one after the other, do not pay: they jam")
+    reason = larger_instead(made, weak, *larger, asked)
+    assert reason.startswith("LARGER BALLS FOR THE INTENSITY: they touch 100% of the target")
+    assert "98 % after about 100 s, as 1 mm at 40 µm with about 0.05 mmA do" in reason
+    other, strong = larger
+    unlike = replace(other, jams=(*made.jams, *other.jams, None))  # type: ignore[arg-type]
+    for there, pilot in (
+        (other, pilot_of(0.12, 700.0)),  # later
+        (other, pilot_of(0.2, 100.0)),  # beyond the range
+        (other, strong._replace(places=False)),  # on average alone
+        (other, strong._replace(intensity=None)),
+        (unlike, strong),  # balls jam
+    ):
+        assert larger_instead(made, weak, there, pilot, asked) == ""
     for enough in (pilot_of(0.12, 600.0), pilot_of(0.2, 600.0), None):
         assert larger_balls(made, wanted, asked, enough, again, measure) is None
     fixed = replace(wanted, ball_mm=1.0)
