@@ -104,7 +104,8 @@ def _main_facts(design: Design, facts: Mapping[str, Any]) -> Iterator[Fact]:
         share = f"{100.0 * reach['target_reachable_share']:.3g} % of the target"
         yield Fact("reach", f"balls of {_quantity(reach, 'ball_mm')} can touch {share}")
     if "replicas" in facts:
-        count = counted(facts["replicas"]["count"], "replica")
+        least, most = (facts["replicas"][key] for key in ("count", "most"))
+        count = counted(most, "replica") if most == least else f"{least} to {most} replicas"
         yield Fact("simulated", f"{count} of {_quantity(facts['replicas'], 'recorded_s')}")
     for name, text in facts.get("materials", {}).items():
         yield Fact("materials", f"{name}: {text}", own_line=True)

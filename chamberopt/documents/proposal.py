@@ -116,7 +116,7 @@ def proposal_in_words(made: Proposal, left_out: Sequence[LeftOut]) -> ProposalIn
     return ProposalInWords(
         _sentence(made),
         tuple(rows),
-        tuple(_matter(text) for text in to_settle(made, left_out)),
+        tuple(matter_of(text) for text in to_settle(made, left_out)),
         tuple(_choice(one, one.name == target) for one in made.known),
     )
 
@@ -143,7 +143,8 @@ def proposal_lines(told: ProposalInWords, verbose: bool) -> list[str]:
     return [*lines, "", *choice_lines(told.choices, most)]
 
 
-def _matter(text: str) -> Matter:
+def matter_of(text: str) -> Matter:
+    """Return what is to be settled, as a sentence after the words that mark it."""
     sentence = _as_sentence(one_line(text))
     found = TO_SETTLE.match(sentence)
     mark = found[0] if found else ""

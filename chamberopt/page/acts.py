@@ -26,6 +26,7 @@ from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
 from chamberopt.documents.answer import on_average
 from chamberopt.documents.comparison import comparison_end
+from chamberopt.documents.proposal import matter_of
 from chamberopt.documents.report import answer_section
 from chamberopt.documents.study import aim_in_words
 from chamberopt.documents.wording import value_text
@@ -410,7 +411,12 @@ def _told_of(file: EditedFile) -> dict[str, object]:
         "surfaces": picked_surfaces(design),
         "steps": step_texts(design),
         "to_settle": [
-            {"text": one, "words": on_page(one), "takes": _taken(design, one)}
+            {
+                "text": one,
+                "mark": matter_of(one).mark.capitalize(),
+                "words": on_page(matter_of(one).text),
+                "takes": _taken(design, one),
+            }
             for one in design.to_settle
         ],
     }

@@ -170,7 +170,7 @@ def _surfaces(
         "few": {"triangles": _packed(corners[~resolved], "<i4"), "kind": "few"},
     }
     around: dict[str, tuple[np.ndarray, str, float]] = {
-        "sonotrode": (is_sonotrode(tags), "sonotrode", 0.55 if eye[2] > 0.0 else 0.08),
+        "sonotrode": (is_sonotrode(tags), "sonotrode", 0.9 if eye[2] > 0.0 else 0.08),
         "deflectors": (walls & on_deflector, "wall", 0.13),
         "walls": (walls & ~on_deflector, "wall", 0.13),
     }

@@ -236,8 +236,8 @@ class CandidateEvaluator:
         """Return whether a candidate needs no more replicas than its first.
 
         In a search this is so if it is clearly worse than the best, or if what is asked of it has
-        an interval: the model of the scores takes noise, and further candidates tell it more than
-        further replicas do (benchmarks/optimizers.py: ours against ours-sure). In a confirmation it
+        a number: the model of the scores takes noise, and further replicas are worth no more than
+        further candidates (benchmarks/optimizers.py: ours against ours-sure). In a confirmation it
         is so if more would tell nothing that the study asks for.
         """
         if candidate.bar is not None and found.objective.high < candidate.bar:

@@ -261,11 +261,12 @@ class _Pilots:
             return with_thin_places(two)
         if larger is None or found is None:
             return _in_budget(without_finer(coarse[0], why), coarse[1])
-        if reason := larger_instead(made, found, *larger, asked):
+        made, after = propose_second_pose(made, found, quietly)
+        both = made, after or found, coarse[0], coarse[1] or larger[1]
+        if reason := larger_instead(*both, asked):
             reasons = {**coarse[0].reasons, "shot.diameter_mm": reason}
             return _in_budget(replace(coarse[0], reasons=reasons), coarse[1])
-        made = beside_larger(made, found, *larger, why)
-        return _in_budget(*propose_second_pose(made, found, quietly))
+        return _in_budget(beside_larger(*both, why), after)
 
     def _again(self, other: Wanted) -> Proposal:
         with no_steps():  # those of the first proposal, again

@@ -63,6 +63,9 @@ def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
         **_tolerance_facts(design),
         "replicas": {
             "count": accuracy.replicas,
+            "most": accuracy.replicas
+            if accuracy.objective_half_width is None
+            else accuracy.max_replicas,
             "recorded_s": _rounded(process.recorded_time),
             "warmup_s": _rounded(accuracy.warmup_time),
             "simulated_s_in_all": _rounded(simulated),

@@ -383,7 +383,7 @@ def _hardness_in_words(part: str, shot: str) -> str:
     metal = alloy(part)
     if metal.metal != "steel" or metal.stainless or metal.hardness_HB < HARDENED_HB:
         return ""
-    state = metal.condition.replace(";", ",")
+    state = metal.condition.replace(";", ",").replace(f", {metal.hardness_HB:g} HB", "")
     text = f"; HARDNESS ASSUMED, {metal.hardness_HB:g} HB ({state}): confirm it, as "
     if shot == HARD:
         return (

@@ -208,7 +208,7 @@ def _over_the_face(sizes: Sizes, shop: Shop, face: Face) -> Floor:
     def room(sides: Iterable[float]) -> str:
         """Return in words how wide the room must be where its wall goes round the face."""
         wide = " x ".join(f"{one + 2.0 * shop.clearance_mm:g}" for one in sides)
-        return f"{clear}: make it {wide} mm wide"
+        return f"{clear}, a slit that is not simulated: build it {wide} mm wide"
 
     plan = dict(zip(("length_mm", "width_mm"), _along(sizes, face), strict=True))
     if sizes.shape == "cylinder":

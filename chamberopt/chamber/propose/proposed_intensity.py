@@ -236,9 +236,11 @@ def larger_instead(
         found: what a pilot measured of the proposal.
         other, told: the proposal with larger balls, and what a pilot measured of it.
     """
+    if found.intensity is None or told.intensity is None:
+        return ""
     now, then = setting_of(made), setting_of(other)
     here, there = fit_sizes(made.chamber.part, [1e-3 * now.ball_mm, 1e-3 * then.ball_mm])
-    gives = told.intensity is not None and not intensity.off(told.intensity.value)
+    gives = not intensity.off(told.intensity.value)
     gets_there = (
         there.touched >= here.touched - MISSED and there.fillets >= here.fillets - MISSED_FILLETS
     )

@@ -210,9 +210,10 @@ def _met_beside(
         for one, inside, whole in met[:MOST_NAMED]
     ]
     more = f" and {len(met) - MOST_NAMED} more" if len(met) > MOST_NAMED else ""
+    still = "STILL " if proposal.design.mask is not None else ""
     runs = "runs or fits by its name, and " if RUNNING.search(met[0][0].name) else ""
     yield LeftOut(
         {},
-        f"NOT MASKED: the shot also meets {', '.join(names)}{more}; {runs}what has to keep its "
-        "size and finish takes a [mask] (docs/how_to/chambers.md)",
+        f"{still}NOT MASKED: the shot also meets {', '.join(names)}{more}; {runs}what has to keep "
+        "its size and finish takes a [mask] (docs/how_to/chambers.md)",
     )

@@ -26,8 +26,11 @@ class OpenSurfaceError(SurfaceError):
 
 
 def format_box(sides: np.ndarray) -> str:
-    """Return the sides (3,) [m] of a bounding box as text: '44 x 44 x 70 mm'."""
-    return " x ".join(f"{1e3 * side:.5g}" for side in sides) + " mm"
+    """Return the sides (3,) [m] of a bounding box as text: '44 x 44 x 70 mm'.
+
+    Chords of a curved surface are a little shorter than it: sides have four digits.
+    """
+    return " x ".join(f"{1e3 * side:.4g}" for side in sides) + " mm"
 
 
 def format_point(point: np.ndarray) -> str:

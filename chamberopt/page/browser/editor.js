@@ -121,14 +121,14 @@ function refuse(text) {
 function fillSettle() {
   const open = state.changes.to_settle ?? state.file.to_settle.map((one) => one.text);
   const rows = state.file.to_settle.filter((one) => open.includes(one.text)).map((one) => {
-    const done = element("button", { type: "button", textContent: "Settled", title: "take it out of the design" });
+    const done = element("button", { type: "button", textContent: "Mark as settled", title: "take it out of the design" });
     done.addEventListener("click", () => change({ to_settle: open.filter((text) => text !== one.text) }));
     const takes = one.takes.map(({ label, changes }) => {
       const [[name, wanted]] = Object.entries(changes), take = element("button", { type: "button", textContent: label, title: `sets ${name}`, disabled: value(name) === wanted });
       take.addEventListener("click", () => change(changes));
       return take;
     });
-    return element("li", {}, element("span", {}, ...onPage(one.words)), ...takes, done);
+    return element("li", {}, element("span", {}, element("b", { textContent: one.mark }), ...onPage(one.words)), ...takes, done);
   });
   const list = element("ol", {}, ...rows);
   find("settle").replaceChildren(...rows.length ? [element("h2", { textContent: "To be settled before it is built" }), list] : []);

@@ -69,6 +69,11 @@ function numberRow(field) {
     show(value(field.name));
   };
   const show = (now) => {
+    const [least, most] = ends.get(field.name);
+    if (now !== null && (now < least || now > most)) { // a study between the ends has the value too
+      ends.set(field.name, [Math.min(now, least), Math.max(now, most)]);
+      scale();
+    }
     if (document.activeElement !== box) box.value = now ?? "";
     slider.value = now ?? slider.min;
     row.classList.toggle("changed", now !== original(field.name));

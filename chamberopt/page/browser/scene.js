@@ -2,7 +2,7 @@
 import { change, endMove, unpack, value } from "./state.js";
 import { colourByState, wayToTarget } from "./surfaces.js";
 
-const CLEAR = 0.16, FACE = 0.6; // opacity of walls and sonotrode
+const CLEAR = 0.16, FACE = 0.9; // opacity of walls and sonotrode
 const BODIES = ["deflectors", "holder", "mask"]; // that not every chamber has
 export const view = new View3D(document.getElementById("view"));
 const tools = new Tools([view], document.getElementById("tools"));

@@ -66,11 +66,17 @@ def test_a_wall_round_a_face_is_wider_by_its_clearance(clear: float) -> None:
     own = shop(DISC, BLOCK, clearance_mm=clear)
     wide = 60.0 + 2.0 * clear
     found = floor({"diameter_mm": 52.0}, "cylinder", own)
-    assert f"the wall round it {clear:g} mm clear: make it {wide:g} mm wide" in found.reason
+    assert (
+        f"the wall round it {clear:g} mm clear, a slit that is not simulated: build it {wide:g} mm"
+        in found.reason
+    )
     found = floor({"length_mm": 110.0, "width_mm": 30.0}, "box", own)
     assert found.reason.endswith(f"the wall ends over its face, {clear:g} mm clear")
     found = floor({"length_mm": 60.0, "width_mm": 50.0}, "box", own)
-    assert f"on two sides, {clear:g} mm clear: make it {50.0 + 2.0 * clear:g} mm" in found.reason
+    assert (
+        f"on two sides, {clear:g} mm clear, a slit that is not simulated: build it "
+        f"{50.0 + 2.0 * clear:g} mm" in found.reason
+    )
 
 
 def test_faces_of_the_part_that_are_walls_fix_the_floor() -> None:
