@@ -86,6 +86,12 @@ class Proposal:
     # Dents in a window that the peening strength takes, by a pilot; 0 if no intensity is wanted.
     strength_dents: float = 0.0
 
+    @property
+    def sonotrode_count(self) -> int:
+        """How many sonotrodes side by side carry the chamber."""
+        blocks = self.design.sonotrode.blocks
+        return 1 if blocks is None else blocks.count
+
 
 def checked(
     tables: Tables,

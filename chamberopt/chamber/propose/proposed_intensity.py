@@ -229,8 +229,8 @@ def larger_instead(
 ) -> str:
     """Return why larger balls are taken in the place of those that fit fillets and slots by rule.
 
-    They give the intensity, touch about as much, and cover the target no later by pilots. Else the
-    text is empty.
+    They give the intensity, touch about as much, and cover the target no later by pilots, on no
+    more sonotrodes. Else the text is empty.
 
     Args:
         found: what a pilot measured of the proposal.
@@ -245,7 +245,9 @@ def larger_instead(
         there.touched >= here.touched - MISSED and there.fillets >= here.fillets - MISSED_FILLETS
     )
     as_soon = told.places >= found.places and told.time_to_98 <= found.time_to_98
-    if not (gives and gets_there and as_soon) or new_harm(other, made):
+    if other.sonotrode_count > made.sonotrode_count or new_harm(other, made):
+        return ""
+    if not (gives and gets_there and as_soon):
         return ""
     return (
         f"{LARGER}: they touch {there.touched:.0%} of the target and cover it no later by pilots, "

@@ -140,17 +140,12 @@ def _is_quicker(one: Way, other: Way) -> bool:
         return False
     if (
         other.found.time_to_98 > LONG
-        and _sonotrodes(one.made) <= SEVERAL
+        and one.made.sonotrode_count <= SEVERAL
         and one.found.time_to_98 < HALF * other.found.time_to_98
     ):
         return True
-    ratio = max(_sonotrodes(one.made) / _sonotrodes(other.made), 1.0)
+    ratio = max(one.made.sonotrode_count / other.made.sonotrode_count, 1.0)
     return ratio * one.found.time_to_98 < QUICKER * other.found.time_to_98
-
-
-def _sonotrodes(made: Proposal) -> int:
-    blocks = made.design.sonotrode.blocks
-    return 1 if blocks is None else blocks.count
 
 
 def _said(found: Measured | None) -> str:
@@ -171,7 +166,7 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
     for one, harm in [(first, ""), *tried]:
         name = named(one)
         what = harm or _said(one.found)
-        count = _sonotrodes(one.made)
+        count = one.made.sonotrode_count
         on, taken = f" on {count} sonotrodes" if count > 1 else "", " (taken)" * (one is best)
         texts.append(f"{name}{on} {what}{taken}")
     if len(texts) == 1:
