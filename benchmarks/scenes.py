@@ -76,11 +76,15 @@ def cylinder(radius: float, height: float, triangles: int) -> TriangleMesh:
 
 
 def gear(subdivisions: int) -> TriangleMesh:
-    """The chamber of designs/gear.toml, every triangle split in four so many times."""
+    """The chamber of designs/gear.toml on the facets of its file, each split in four so many times.
+
+    So its triangles are as many as before surfaces were divided, and versions can be compared.
+    """
     from chamberopt.chamber.build import build_chamber
     from chamberopt.design.load import load_design
 
-    chamber = build_chamber(load_design(ROOT / "designs" / "gear.toml"))
+    design = load_design(ROOT / "designs" / "gear.toml").changed({"part.smoothing": "off"})
+    chamber = build_chamber(design)
     vertices, triangles, tags = chamber.vertices, chamber.triangles, chamber.tags
     for _ in range(subdivisions):
         vertices, triangles, index = trimesh.remesh.subdivide(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.number_text import plain
 
 
 class SurfaceError(InputError):
@@ -30,7 +31,7 @@ def format_box(sides: np.ndarray) -> str:
 
     Chords of a curved surface are a little shorter than it: sides have four digits.
     """
-    return " x ".join(f"{1e3 * side:.4g}" for side in sides) + " mm"
+    return " x ".join(plain(1e3 * float(side)) for side in sides) + " mm"
 
 
 def format_point(point: np.ndarray) -> str:
