@@ -5,6 +5,7 @@ Every number comes from a rule of thumb, with its reason beside it. A study then
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -52,7 +53,7 @@ from chamberopt.chamber.propose.proposed_arbor import (
     turning_bore,
     turning_pose,
 )
-from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball, sizes_to_try
+from chamberopt.chamber.propose.proposed_balls import MANY, fit_sizes, propose_ball, sizes_to_try
 from chamberopt.chamber.propose.proposed_end import (
     HeldEnd,
     bare_end,
@@ -340,7 +341,10 @@ def _proposed(
                 made, floor = other, its_floor
     made = padded(masked(made, floor, bores, wanted.shop), floor, target, wanted.shop)
     made = only_touched(made, floor, wanted.shop)
-    return replace(made, reasons={**made.reasons, **_room_reason(made, floor)})
+    reasons = {**made.reasons, **_room_reason(made, floor)}
+    if made.design.shot.count <= MANY:  # that many are under the whole part, not in this chamber
+        reasons["shot.diameter_mm"] = re.sub("; MANY BALLS[^;]*", "", reasons["shot.diameter_mm"])
+    return replace(made, reasons=reasons)
 
 
 def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:

@@ -49,10 +49,7 @@ WIDER, SHORTEST, LONGEST = 2.0, 0.25, 0.4
 # An end narrows if its outer TIP, a share of the grip, is slimmer than STRAIGHT of the whole grip.
 TIP, STRAIGHT = 0.1, 0.8
 PINS = "expanding pins, drawn from behind, in its"
-POTTED = (
-    "NO STRAIGHT END TO CLAMP: give jaws its form, or cast it into the block with polyurethane or "
-    "an alloy that melts at 70 °C"
-)
+POTTED = "NO STRAIGHT END TO CLAMP: give jaws its form, or cast it into the block with polyurethane"
 WALL = 2e-3  # m: of a collar or block round an end
 THINNEST, SLIM = 2e-3, 0.15  # of a rod: m, and over the part's width: slim ones come last
 # Over the radius of a face: least seat of a rod round a hole in it, and least edge beside a target.

@@ -171,3 +171,4 @@ def test_a_crank_pin_gets_a_chamber_between_its_webs(tmp_path: Path) -> None:
     assert 1e6 * sleeve.covered == pytest.approx((30.0 - 2.0 * margin) * around, rel=1e-3)
     assert sleeve.covered_target == 0.0
     assert "a sleeve on PIN" in made.reasons["mask.margin_mm"]
+    assert "MANY BALLS" not in made.reasons["shot.diameter_mm"]  # 949, and 3,445 under all of it
