@@ -413,11 +413,11 @@ def _told_of(file: EditedFile) -> dict[str, object]:
         "to_settle": [
             {
                 "text": one,
-                "mark": matter_of(one).mark.capitalize(),
-                "words": on_page(matter_of(one).text),
+                "mark": matter.mark.capitalize(),
+                "words": on_page(matter.text),
                 "takes": _taken(design, one),
             }
-            for one in design.to_settle
+            for one, matter in zip(design.to_settle, map(matter_of, design.to_settle), strict=True)
         ],
     }
 

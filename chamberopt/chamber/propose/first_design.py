@@ -94,7 +94,7 @@ AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is t
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
 # Balls for aluminium and for an alloy of implants, which a word of its name tells.
 CERAMIC, IMPLANT = "zirconia", "ELI"
-# Least hardness of steel balls over the part's. A part as hard as they are is hardly dented: in
+# Least hardness of steel balls over the part's. A part as hard as they are is dented less: in
 # pilots of a gear of 650 HB tungsten carbide left 9 times the dents.
 HARDER = 1.25
 HARDENED_HB = 280.0  # of steel: from here on it was hardened, to what its name does not tell
