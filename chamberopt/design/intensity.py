@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
 
 from chamberopt.common.errors import InputError
@@ -165,6 +165,11 @@ class PredictedIntensity:
         value = 1e-3 * USUAL_K * one.value
         sd = math.hypot(USUAL_K_LOG_SD, one.half_width / (Z * one.value))
         return cls(value, value * math.exp(-Z * sd), value * math.exp(Z * sd), math.exp(sd))
+
+    def times(self, factor: float) -> PredictedIntensity:
+        """Return the prediction for something whose intensity is a multiple of this one."""
+        low, value, high = (factor * one for one in (self.low, self.value, self.high))
+        return replace(self, value=value, low=low, high=high)
 
     def standing(self, wanted: tuple[float, float]) -> str:
         """Return where the whole 95 % interval lies: INSIDE a range, OUTSIDE it, or NOT_DECIDED.

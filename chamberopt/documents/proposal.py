@@ -19,7 +19,8 @@ from chamberopt.chamber.propose.proposed_target import area_in_mm2
 from chamberopt.chamber.propose.text import TO_SETTLE, clauses, to_settle
 from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import in_words
-from chamberopt.common.number_text import plain
+from chamberopt.common.number_text import plain, rounded
+from chamberopt.documents.document import Table
 
 if TYPE_CHECKING:
     from chamberopt.chamber.propose.proposal import Proposal
@@ -88,10 +89,12 @@ class ProposalInWords:
         rows: the proposed values with their reasons, in the order in which a shop asks.
         matters: what is to be settled before it is built.
         choices: surfaces to choose a target from.
+        trials: balls of several sizes, where pilots compared them.
     """
 
     sentence: str
     rows: tuple[Row, ...]
+    trials: Table | None
     matters: tuple[Matter, ...]
     choices: tuple[Choice, ...]
 
@@ -116,28 +119,31 @@ def proposal_in_words(made: Proposal, left_out: Sequence[LeftOut]) -> ProposalIn
     return ProposalInWords(
         _sentence(made),
         tuple(rows),
+        _trials(made) if made.trials else None,
         tuple(matter_of(text) for text in to_settle(made, left_out)),
         tuple(_choice(one, one.name == target) for one in made.known),
     )
 
 
-def proposal_lines(told: ProposalInWords, verbose: bool) -> list[str]:
-    """Return a proposal in lines of at most WIDTH columns.
+def proposal_lines(told: ProposalInWords, verbose: bool) -> list[Table | str]:
+    """Return a proposal in lines of at most WIDTH columns, and tables.
 
     Args:
         verbose: what is simulated is told too, and all surfaces are listed.
     """
-    lines = [*wrapped(told.sentence, 0), ""]
+    lines: list[Table | str] = [*wrapped(told.sentence, 0), ""]
     for row in told.rows:
         if verbose or row.name != SIMULATED:
             lines += wrapped(f"{row.name:{INDENT}}{row.value}", INDENT)
             for reason in row.reasons:
                 lines += wrapped(f"{'':{INDENT}}{reason}", INDENT)
+    if told.trials is not None:
+        lines += ["", *wrapped(f"{told.trials.caption}:", 0), told.trials]
     if told.matters:
         lines += ["", "To be settled before it is built:"]
         for number, matter in enumerate(told.matters, 1):
             lines += wrapped(f"{number:2}. {matter.mark}{matter.text}", 4)
-    if any("serve" in reason for row in told.rows for reason in row.reasons):
+    if told.trials or any("serve" in reason for row in told.rows for reason in row.reasons):
         lines += ["", *wrapped(SERVES, 0)]
     most = len(told.choices) if verbose else MOST_LISTED
     return [*lines, "", *choice_lines(told.choices, most)]
@@ -251,6 +257,29 @@ def _balls(made: Proposal) -> Iterator[str]:
         if size not in seen:
             seen.add(size)
             yield f"{one.shot.count:,} balls of {size:g} mm ({material}, {1e3 * one.shot.mass:g} g)"
+
+
+def _trials(made: Proposal) -> Table:
+    """Return a table of the balls that pilots compared, one row a size."""
+    taken = {round(1e3 * one.shot.diameter, 4) for one in made.design.in_steps.values()}
+    several = any(one.sonotrode_count > 1 for one in made.trials)
+    head = ["balls", "touch", "serve", "amplitude", "intensity", "98 % after", "number"]
+    head += ["sonotrodes"] * several
+    rows = []
+    for one in made.trials:
+        known = one.intensity
+        after = f"{rounded(one.time_to_98, 2)} s" if one.time_to_98 else "not resolved"
+        row = [
+            f"{one.ball_mm:g} mm" + ", taken" * (one.ball_mm in taken),
+            f"{one.fit.touched:.0%}",
+            f"{one.fit.served:.0%}",
+            f"{one.amplitude_um:g} µm",
+            f"{plain(known.value, 2)} mmA" if known else "not known",
+            one.harm or after,
+            f"{one.count:,}",
+        ]
+        rows.append(row + [str(one.sonotrode_count)] * several)
+    return Table("Balls that pilots compared, each size in a chamber of its own", head, rows)
 
 
 def _numbers(table: Mapping[str, object]) -> Iterator[tuple[str, float]]:

@@ -8,27 +8,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.proposal import new_harm
 from chamberopt.chamber.propose.proposed_budget import TooSlowError, measured_budget, with_budget
 from chamberopt.chamber.propose.proposed_intensity import (
+    Compared,
     as_no_wish,
-    beside_larger,
+    gives,
     is_off,
-    larger_balls,
     larger_instead,
+    of_ball_sizes,
     propose_intensity,
+    settings_beside,
     usual_for,
     with_expected_intensity,
+    with_prediction,
     with_thin_places,
 )
 from chamberopt.chamber.propose.proposed_mask import LeftOut, find_left_out
-from chamberopt.chamber.propose.proposed_setting import setting_of
+from chamberopt.chamber.propose.proposed_setting import Setting, setting_of, with_amplitude
 from chamberopt.chamber.propose.proposed_steps import (
     propose_second_pose,
     turned_over,
@@ -67,7 +71,8 @@ DESIGN, PICTURE = "design.toml", "design.png"
 SIZES, PICTURE_OF = "reading the part and choosing sizes", "drawing the target"
 TIME, WAYS = "simulating briefly, for the treatment time", "trying other poses and charges"
 INTENSITY = "choosing balls and amplitude for the intensity"
-FURTHER_STEP, WRITING = "trying a second pose and finer balls", "drawing and writing the proposal"
+FURTHER_STEP, WRITING = "trying balls of other sizes", "drawing and writing the proposal"
+OF_POSES = "part.rotate_deg", ".steps"  # reasons that tell which poses were tried
 Begin = Callable[[str], None]
 
 
@@ -226,47 +231,105 @@ class _Pilots:
         made, wanted, found = propose_quicker(way, self._again, briefly)
         if found is not None and not found.settled and made.design != first.design:
             found = quietly(made)
-        why_so = {"part.rotate_deg": made.reasons["part.rotate_deg"]}  # with poses that were tried
+        made, found = propose_second_pose(made, found, quietly)
+        wanted = replace(wanted, turned_over=bool(made.design.steps))
+        why_so = {key: made.reasons[key] for key in OF_POSES if key in made.reasons}
         intensity, asked = self.wishes.intensity, self.wishes.asked_intensity()
         # A stated alloy has a usual intensity, which a proposal should not miss.
         seeks = bool(wanted.alloy and intensity is None and found and is_off(made, found.intensity))
         if intensity == USUAL or seeks:
             asked = usual_for(made)
+        by_geometry, scale = setting_of(made).ball_mm, 1.0
         if asked:
             self.begin(INTENSITY)
-            by_geometry = setting_of(made).ball_mm
+            start = made
             try:
-                made = propose_intensity(made, wanted, asked, self._again, self._predict)
-                found = self._measure(made)
+                made, found = self._for_intensity(start, wanted, asked, why_so)
             except InputError:  # which is no reason to stop if nobody asked
                 if not seeks:
                     raise
                 asked = None
-        if not asked:
-            if found is not None:
-                made = with_expected_intensity(made, found.intensity)
-            self.begin(FURTHER_STEP)
-            return _in_budget(*propose_second_pose(made, found, quietly))
-        made = _told(made, why_so)
-        larger = larger_balls(made, wanted, asked, found, self._again, quietly)
-        if larger is not None:
-            larger = _told(larger[0], why_so), larger[1]
-        coarse = larger or (made, found)
-        if seeks:
-            made, coarse = as_no_wish(made), (as_no_wish(coarse[0]), coarse[1])
+            else:  # with these balls it may be worth turning it over
+                over, _ = propose_second_pose(made, found, quietly)
+                if over.design.steps and not start.design.steps:
+                    why_so = {**why_so, ".steps": over.reasons[".steps"]}
+                    other = replace(wanted, turned_over=True)
+                    with suppress(InputError):
+                        start = turned_over(start)
+                        made, found = self._for_intensity(start, other, asked, why_so)
+                        wanted = other
+                if seeks:
+                    made = as_no_wish(made)
         self.begin(FURTHER_STEP)
-        coarse = propose_second_pose(*coarse, quietly)
-        two, why = with_finer_balls(*coarse, by_geometry, quietly)
-        if two is not None:
-            return with_thin_places(two)
-        if larger is None or found is None:
-            return _in_budget(without_finer(coarse[0], why), coarse[1])
-        made, after = propose_second_pose(made, found, quietly)
-        both = made, after or found, coarse[0], coarse[1] or larger[1]
-        if reason := larger_instead(*both, asked):
-            reasons = {**coarse[0].reasons, "shot.diameter_mm": reason}
-            return _in_budget(replace(coarse[0], reasons=reasons), coarse[1])
-        return _in_budget(beside_larger(*both, why), after)
+        if asked is None:
+            made = made if found is None else with_expected_intensity(made, found.intensity)
+        elif found is not None and found.intensity and made.predicted:
+            # What one pilot tells of several sizes is compared; how strong one is, its own tells.
+            scale = made.predicted.value / found.intensity.value
+            found = found._replace(intensity=made.predicted)
+        now = Compared(made, found)
+        further = (
+            self._compared(setting, now, wanted, asked, why_so, scale)
+            for setting in settings_beside(made, wanted, asked, found, by_geometry)
+        )
+        others = [one for one in further if one is not None]
+        if seeks and asked:
+            others = [one._replace(made=as_no_wish(one.made)) for one in others]
+        trials = of_ball_sizes([now, *others]) if others else ()
+        if asked:
+            enough = [one for one in others if gives(asked, one.found)]
+            coarse = now if gives(asked, now.found) or not enough else enough[0]
+            two, why = with_finer_balls(coarse.made, coarse.found, by_geometry, quietly)
+            if two is not None:
+                return replace(with_thin_places(two), trials=trials)
+            now = larger_instead(now, others, trials, asked) or now
+            now = now._replace(made=without_finer(now.made, why))
+        return replace(_in_budget(now.made, now.found), trials=trials)
+
+    def _for_intensity(
+        self, start: Proposal, wanted: Wanted, asked: WantedIntensity, why_so: dict[str, str]
+    ) -> tuple[Proposal, Measured | None]:
+        """Return a proposal for an intensity, and what a pilot measured of it.
+
+        Args:
+            start: the proposal by geometry.
+            why_so: reasons to be kept, by dotted name.
+        """
+        made = _told(propose_intensity(start, wanted, asked, self._again, self._predict), why_so)
+        return made, self._measure(made)
+
+    def _compared(
+        self,
+        setting: Setting,
+        now: Compared,
+        wanted: Wanted,
+        asked: WantedIntensity | None,
+        why_so: dict[str, str],
+        scale: float,
+    ) -> Compared | None:
+        """Return a proposal with other balls and what a pilot measured of it.
+
+        It is None where no chamber can be built for them.
+
+        Args:
+            now: the proposal that they are compared with.
+            asked: the intensity that is sought, if one is.
+            why_so: reasons to be kept, by dotted name.
+            scale: factor on the intensity that the pilot tells.
+        """
+        try:
+            made = self._again(replace(wanted, ball_mm=setting.ball_mm))
+        except InputError:
+            return None
+        made = _told(with_amplitude(made, setting), why_so)
+        if harm := new_harm(made, now.made):
+            return Compared(made, None, harm)
+        found = self._measure(made, is_told=False)
+        if found is not None and found.intensity:
+            found = found._replace(intensity=found.intensity.times(scale))
+        if asked and found and found.intensity:
+            made = with_prediction(made, asked, found.intensity)
+        return Compared(made, found)
 
     def _again(self, other: Wanted) -> Proposal:
         with no_steps():  # those of the first proposal, again

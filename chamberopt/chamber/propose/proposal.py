@@ -13,7 +13,7 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import shot_reach, touched, warnings
 from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
 from chamberopt.chamber.propose.pose import Pose
-from chamberopt.chamber.propose.proposed_balls import MOST_BALLS, charge_of
+from chamberopt.chamber.propose.proposed_balls import MOST_BALLS, SizeFit, charge_of
 from chamberopt.chamber.propose.proposed_floor import Floor
 from chamberopt.chamber.propose.proposed_target import Sizes, Surface
 from chamberopt.chamber.propose.shop import Shop, ShopSonotrode
@@ -21,6 +21,7 @@ from chamberopt.chamber.scene import MAX_BALLS
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_fields import allowed_range
 from chamberopt.design.design import Design, validate
+from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.design.shapes.base import ParametricChamber
 from chamberopt.design.shot import ShotTable
@@ -67,6 +68,31 @@ class Wanted:
 
 
 @dataclass(frozen=True)
+class BallTrial:
+    """What is known of balls of one size for a proposal's target, each size in its own chamber.
+
+    Attributes:
+        ball_mm: their diameter.
+        amplitude_um: of the sonotrode, zero-to-peak.
+        count, sonotrode_count: of balls, and of sonotrodes side by side.
+        fit: how the balls suit the target, without a chamber.
+        time_to_98: after which 95 % of the target is 98 % covered, by a pilot [s]; None if no
+            pilot resolved it.
+        intensity: Almen intensity by that pilot; None if it is not known.
+        harm: why no pilot ran, in words; empty if one did.
+    """
+
+    ball_mm: float
+    amplitude_um: float
+    count: int
+    sonotrode_count: int
+    fit: SizeFit
+    time_to_98: float | None
+    intensity: PredictedIntensity | None
+    harm: str
+
+
+@dataclass(frozen=True)
 class Proposal:
     """A proposed design, the reason for each value, and the warnings of its check."""
 
@@ -85,6 +111,9 @@ class Proposal:
     search_time: float | None = None
     # Dents in a window that the peening strength takes, by a pilot; 0 if no intensity is wanted.
     strength_dents: float = 0.0
+    predicted: PredictedIntensity | None = None  # by that pilot
+    # Balls of several sizes that pilots compared, the smallest first; none without a pilot.
+    trials: tuple[BallTrial, ...] = ()
 
     @property
     def sonotrode_count(self) -> int:

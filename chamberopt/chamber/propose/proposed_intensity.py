@@ -7,7 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from chamberopt.chamber.propose.proposal import Proposal, Wanted, new_harm
+import numpy as np
+
+from chamberopt.chamber.propose.proposal import BallTrial, Proposal, Wanted
 from chamberopt.chamber.propose.proposed_balls import (
     AS_GOOD,
     DEEPEST,
@@ -50,7 +52,8 @@ from chamberopt.geometry.thickness import depth_below
 MOST_PILOTS = 5
 ON_N = 0.1016  # mmA: 0.004 in, below which N strips are taken (SAE J443)
 INTENSITY = "process.intensity_mmA"  # whose reason stands in a design without a wish too
-MOST_LISTED = 3  # other settings in a reason
+MOST_TRIED = 3  # larger sizes that pilots compare
+FURTHER = 2.0  # times as large as the proposed balls, where no intensity says how far
 LARGER = "LARGER BALLS FOR THE INTENSITY"
 
 
@@ -128,10 +131,10 @@ def propose_intensity(
     if chosen in possible.larger:
         reason = _of_larger(chosen, setting_of(made).ball_mm, possible, _values(found))
         one = replace(one, reasons={**one.reasons, "shot.diameter_mm": reason})
-    one = replace(one, strength_dents=found[chosen].dents)
-    others = _other(intensity, [x for x in settings if x != chosen], found)
-    told = with_amplitude(one, chosen), intensity, found[chosen].predicted
-    return _told(*told, others, reason)
+    pilot = found[chosen]
+    one = replace(one, strength_dents=pilot.dents, predicted=pilot.predicted)
+    told = with_amplitude(one, chosen), intensity, pilot.predicted
+    return _told(*told, reason)
 
 
 def _of_larger(
@@ -154,113 +157,123 @@ def _of_larger(
     )
 
 
-def larger_balls(
+def settings_beside(
     made: Proposal,
     wanted: Wanted,
-    intensity: WantedIntensity,
+    intensity: WantedIntensity | None,
     found: Measured | None,
-    again: Callable[[Wanted], Proposal],
-    measure: Callable[[Proposal], Measured | None],
-) -> tuple[Proposal, Measured] | None:
-    """Return a proposal with larger balls and its pilot, where one's own balls are too weak.
+    by_geometry: float,
+) -> list[Setting]:
+    """Return balls, each with an amplitude, that pilots compare with those of a proposal.
 
-    It is None where they are not, or no pilot resolves the intensity of larger ones.
+    They are the balls that geometry alone would give, and larger ones of the stock: up to those
+    that give the intensity, or up to FURTHER times as large.
 
     Args:
         found: what a pilot measured of the proposal; None if nothing.
-        again: proposes the design for other wishes.
-        measure: simulates a proposal briefly; None if that cannot be done.
+        by_geometry: diameter of the balls that geometry alone would give [mm].
     """
-    if found is None or found.intensity is None or wanted.ball_mm is not None:
-        return None
-    off, now = intensity.off(found.intensity.value), setting_of(made)
-    if off >= 0.0:
-        return None
+    if wanted.ball_mm is not None or found is None:
+        return []
+    now, known = setting_of(made), found.intensity
+    off = intensity.off(known.value) if intensity and known else 0.0
+    needed = now.ball_mm * (math.exp(-off / BALL_POWER) if off < 0.0 else FURTHER)
     stock = (wanted.shop or usual_shop()).stock_mm(made.tables["shot"]["material"])
     most = 1e3 * min(LARGEST_BALL, OF_THIN * thinnest(made.chamber.part))
     larger = [one for one in stock if now.ball_mm < one <= most]
-    needed = now.ball_mm * math.exp(-off / BALL_POWER)
-    ball = next((one for one in larger if one >= needed), larger[-1] if larger else None)
-    if ball is None:
-        return None
-    try:
-        other = again(replace(wanted, ball_mm=ball))
-    except InputError:  # no chamber with these balls
-        return None
-    other = with_amplitude(other, Setting(ball, max(amplitudes_of(other.sonotrode)[1])))
-    told = measure(other)
-    if told is None or told.intensity is None:
-        return None
-    other = _with_prediction(other, intensity, told.intensity)
-    reason = f"larger ones for the intensity: {now.in_words} give {_about(found)}"
-    return replace(other, reasons={**other.reasons, "shot.diameter_mm": reason}), told
+    larger = larger[: sum(one < needed for one in larger) + 1]
+    most_tried = MOST_TRIED if off < 0.0 else 2 if intensity is None else 1
+    some = np.unique(np.linspace(len(larger) - 1, 0, most_tried).round().astype(int))
+    sizes = {by_geometry, *(larger[k] for k in some if larger)} - {now.ball_mm}
+
+    def with_amplitude_for(ball: float) -> Setting:
+        if intensity is None or known is None:
+            return now._replace(ball_mm=ball)
+        each = [Setting(ball, one) for one in amplitudes_of(made.sonotrode)[1]]
+        return choose(intensity, each, {now: known.value})
+
+    return [with_amplitude_for(ball) for ball in sorted(sizes)]
 
 
-def beside_larger(
-    made: Proposal, found: Measured, other: Proposal, told: Measured, why: str
-) -> Proposal:
-    """Return a proposal that tells what larger balls would do.
+def gives(intensity: WantedIntensity | None, found: Measured | None) -> bool:
+    """Return whether a pilot's intensity lies in a wanted range."""
+    if intensity is None or found is None or found.intensity is None:
+        return False
+    return not intensity.off(found.intensity.value)
 
-    They give more intensity, and leave out narrow places of the target. Which counts more is the
-    user's choice, so both are told, each by a pilot.
 
-    Args:
-        found: what a pilot measured of the proposal.
-        other, told: the proposal with larger balls, and what a pilot measured of it.
-        why: why finer balls after the larger ones are not proposed.
+class Compared(NamedTuple):
+    """A proposal with balls of one size, as it is compared with those of other sizes.
+
+    Attributes:
+        found: what a pilot measured of it; None if nothing.
+        harm: why it is no choice, in words, so that no pilot ran; empty if it is one.
     """
-    now, then = setting_of(made), setting_of(other)
-    both = fit_sizes(made.chamber.part, [1e-3 * now.ball_mm, 1e-3 * then.ball_mm])
-    here, there = (
-        f"{_about(pilot)}, {fit.touched:.0%} of the target touched, {fit.served:.0%} served, "
-        f"{pilot.in_words}"
-        for pilot, fit in zip((found, told), both, strict=True)
+
+    made: Proposal
+    found: Measured | None
+    harm: str = ""
+
+
+def of_ball_sizes(all_of: Sequence[Compared]) -> tuple[BallTrial, ...]:
+    """Return what is known of the balls of several proposals for one target, the smallest first."""
+    ordered = sorted(all_of, key=lambda one: setting_of(one.made).ball_mm)
+    sizes = [1e-3 * setting_of(one.made).ball_mm for one in ordered]
+    return tuple(
+        BallTrial(
+            *setting_of(one.made),
+            one.made.design.shot.count,
+            one.made.sonotrode_count,
+            fit,
+            None if one.found is None or not one.found.places else one.found.time_to_98,
+            None if one.found is None else one.found.intensity,
+            one.harm,
+        )
+        for one, fit in zip(ordered, fit_sizes(all_of[0].made.chamber.part, sizes), strict=True)
     )
-    text = (
-        f"WITH LARGER BALLS, {then.in_words}: {there}, beside {here} with {now.in_words} "
-        f"(--ball-mm {then.ball_mm:g} takes them), and both, one after the other, do not pay: {why}"
-    )
-    reasons = {**made.reasons, INTENSITY: f"{made.reasons[INTENSITY]}; {text}"}
-    return replace(made, reasons=reasons)
 
 
 def larger_instead(
-    made: Proposal, found: Measured, other: Proposal, told: Measured, intensity: WantedIntensity
-) -> str:
-    """Return why larger balls are taken in the place of those that fit fillets and slots by rule.
+    now: Compared,
+    others: Sequence[Compared],
+    trials: Sequence[BallTrial],
+    intensity: WantedIntensity | None,
+) -> Compared | None:
+    """Return the proposal with larger balls that is taken instead of one by geometry, if one is.
 
-    They give the intensity, touch about as much, and cover the target no later by pilots, on no
-    more sonotrodes. Else the text is empty.
+    Its balls give the intensity, which the others miss, touch about as much, and cover the target
+    no later by pilots, on no more sonotrodes.
 
     Args:
-        found: what a pilot measured of the proposal.
-        other, told: the proposal with larger balls, and what a pilot measured of it.
+        now: the proposal whose balls fit fillets and slots by rule.
+        others: proposals with other balls.
+        trials: what is known of the balls of all of them.
     """
-    if found.intensity is None or told.intensity is None:
-        return ""
-    now, then = setting_of(made), setting_of(other)
-    here, there = fit_sizes(made.chamber.part, [1e-3 * now.ball_mm, 1e-3 * then.ball_mm])
-    gives = not intensity.off(told.intensity.value)
-    gets_there = (
-        there.touched >= here.touched - MISSED and there.fillets >= here.fillets - MISSED_FILLETS
-    )
-    as_soon = told.places >= found.places and told.time_to_98 <= found.time_to_98
-    if other.sonotrode_count > made.sonotrode_count or new_harm(other, made):
-        return ""
-    if not (gives and gets_there and as_soon):
-        return ""
-    return (
-        f"{LARGER}: they touch {there.touched:.0%} of the target and cover it no later by pilots, "
-        f"{told.in_words}, as {now.in_words} with {_about(found)} do, {found.in_words}. But "
-        f"{1.0 - there.served:.0%} of it lies in fillets of less than 2 or slots of less than 4 "
-        f"of their diameters, for which practice takes smaller ones (--ball-mm {now.ball_mm:g} "
-        "takes these)"
-    )
-
-
-def _about(found: Measured) -> str:
-    """Return the intensity that a pilot measured, in words."""
-    return "" if found.intensity is None else f"about {plain(found.intensity.value, 2)} mmA"
+    if now.found is None or now.found.intensity is None or gives(intensity, now.found):
+        return None
+    here, fits = setting_of(now.made), {one.ball_mm: one.fit for one in trials}
+    fit = fits[here.ball_mm]
+    for one in sorted(others, key=lambda one: setting_of(one.made).ball_mm):
+        there, found = setting_of(one.made), one.found
+        if found is None or one.harm or there.ball_mm < here.ball_mm or not gives(intensity, found):
+            continue
+        other = fits[there.ball_mm]
+        if (
+            other.touched >= fit.touched - MISSED
+            and other.fillets >= fit.fillets - MISSED_FILLETS
+            and found.places >= now.found.places
+            and found.time_to_98 <= now.found.time_to_98
+            and one.made.sonotrode_count <= now.made.sonotrode_count
+        ):
+            reason = (
+                f"{LARGER}: they touch {other.touched:.0%} of the target and cover it no later by "
+                f"pilots than {here.in_words}, which are too weak; but {1.0 - other.served:.0%} of "
+                "it lies in fillets of less than 2 or slots of less than 4 of their diameters, for "
+                f"which practice takes smaller ones (--ball-mm {here.ball_mm:g} takes these)"
+            )
+            reasons = {**one.made.reasons, "shot.diameter_mm": reason}
+            return one._replace(made=replace(one.made, reasons=reasons))
+    return None
 
 
 def usual_for(made: Proposal) -> WantedIntensity:
@@ -355,7 +368,7 @@ def _depth(made: Proposal, share: float) -> float:
     return depth_below(part.vertices, part.triangles, part.target, share, DEEPEST)
 
 
-def _with_prediction(
+def with_prediction(
     made: Proposal, wanted: WantedIntensity, predicted: PredictedIntensity, more: str = ""
 ) -> Proposal:
     """Return a proposal with its wanted intensity, and in the reason the predicted one."""
@@ -372,20 +385,15 @@ def _with_prediction(
 
 
 def _told(
-    made: Proposal,
-    wanted: WantedIntensity,
-    predicted: PredictedIntensity,
-    others: str,
-    by_geometry: str,
+    made: Proposal, wanted: WantedIntensity, predicted: PredictedIntensity, by_geometry: str
 ) -> Proposal:
     """Return a proposal with the reasons for its balls and its amplitude.
 
     Args:
-        others: further settings in the range, in words.
         by_geometry: reason for the balls that geometry alone would have given.
     """
     key = amplitudes_of(made.sonotrode)[0]
-    off, more = wanted.off(predicted.value), others
+    off, more = wanted.off(predicted.value), ""
     if off:
         more = f"; NO BALLS THAT SERVE THE TARGET GIVE THIS INTENSITY: {_needed(made, off)}"
     reasons = dict(made.reasons)
@@ -396,7 +404,7 @@ def _told(
     else:
         ball += f", among balls that serve the target; the largest of them: {by_geometry}"
     reasons["shot.diameter_mm"] = ball
-    return _with_prediction(replace(made, reasons=reasons), wanted, predicted, more)
+    return with_prediction(replace(made, reasons=reasons), wanted, predicted, more)
 
 
 def _needed(made: Proposal, off: float) -> str:
@@ -413,17 +421,6 @@ def _needed(made: Proposal, off: float) -> str:
         f"it takes an amplitude of about {plain(amplitude, 2)} µm zero-to-peak, or balls of about "
         f"{plain(ball, 2)} mm, {allowed} are proposed here (choose others: --ball-mm)"
     )
-
-
-def _other(
-    wanted: WantedIntensity, settings: Sequence[Setting], found: Mapping[Setting, IntensityPilot]
-) -> str:
-    """Return in words other settings whose intensity is expected in the range."""
-    simulated = _values(found)
-    inside = [one for one in settings if not wanted.off(expected_intensity(one, simulated))]
-    inside.sort(key=lambda one: abs(math.log(expected_intensity(one, simulated) / wanted.middle)))
-    listed = ", ".join(one.in_words for one in inside[:MOST_LISTED])
-    return f"; others expected in it: {listed}" if inside else ""
 
 
 def _values(found: Mapping[Setting, IntensityPilot]) -> dict[Setting, float]:

@@ -98,7 +98,10 @@ def propose_second_pose(
     if not enough or (is_hidden and touched_share(two) < COVERED):
         return dropped(f"by a pilot {after.in_words} then, in one pose {found.in_words}")
     before = f"{touched_share(made):.0%} of the target is in reach" if is_hidden else found.in_words
-    reason = f"turned over after half of the time: by pilots {after.in_words}, in one pose {before}"
+    reason = (
+        f"turned over after half of the time: by pilots with balls of {setting_of(made).ball_mm:g} "
+        f"mm {after.in_words}, in one pose {before}"
+    )
     return replace(two, reasons={**two.reasons, ".steps": reason}), after
 
 

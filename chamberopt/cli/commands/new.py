@@ -95,6 +95,7 @@ def new(
     from chamberopt.common.progress import tell_program
     from chamberopt.documents.proposal import proposal_in_words, proposal_lines
     from chamberopt.geometry.meshes.units import STATED, UnknownUnitError
+    from chamberopt.printers.terminal import text
     from chamberopt.workflows.propose import (
         DESIGN,
         SIZES,
@@ -149,9 +150,9 @@ def new(
     done = write_proposal(made, part, wishes, choose, out, teller)
     words = proposal_in_words(done.made, done.left_out)
     if not json:
-        show(proposal_lines(words, verbose))
-    print_remarks(f"note: {one_line(text)}" for text in done.made.mesh.notes)
-    print_remarks(f"warning: {text}" for text in done.made.warnings)
+        show([text(proposal_lines(words, verbose))])
+    print_remarks(f"note: {one_line(note)}" for note in done.made.mesh.notes)
+    print_remarks(f"warning: {one}" for one in done.made.warnings)
     if json:
         studies = [str(out / name) for name in done.studies]
         print_json({**asdict(words), "design": str(out / DESIGN), "studies": studies})

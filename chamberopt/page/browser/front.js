@@ -169,13 +169,14 @@ function tell({ steps, seconds, lines, warnings, fault, exit, picture, result, p
   find("to-settle").hidden ||= isDraft; // what the pilots change is not to be settled
 }
 
-function showProposal({ sentence, rows, matters, choices }, design) {
+function showProposal({ sentence, rows, trials, matters, choices }, design) {
   find("sentence").replaceChildren(...onPage(sentence));
   find("to-settle").hidden = !matters.length;
   find("matters").replaceChildren(...matters.map(({ mark, text, balls }) => element("li", {}, element("b", { textContent: mark }), ...onPage(text), ...balls.map(withBalls))));
   find("rows").replaceChildren(...rows.map(({ name, value, reasons }) => element("tr", {},
     element("th", { textContent: name[0].toUpperCase() + name.slice(1) }),
     element("td", {}, element("b", {}, ...onPage(value)), ...reasons.map((words) => element("p", {}, ...onPage(words)))))));
+  find("trials").replaceChildren(...trials ? [element("caption", { textContent: trials.caption }), ...[trials.head, ...trials.rows].map(([first, ...others], k) => element("tr", {}, element("th", { textContent: first }), ...others.map((textContent) => element(k ? "td" : "th", { textContent }))))] : []);
   find("choices").replaceChildren(...choices.map(({ name, text, place, alone, is_target }) => {
     const title = [place && `at ${place} mm in the part's file`, alone].filter(Boolean).join("; ");
     const button = element("button", { title, ariaPressed: String(is_target) }, name, element("small", { textContent: ` ${text}` }));

@@ -15,13 +15,14 @@ from chamberopt.chamber.propose.proposed_budget import Asked, Measured, propose_
 from chamberopt.chamber.propose.proposed_intensity import (
     INTENSITY,
     MOST_PILOTS,
+    Compared,
     IntensityPilot,
     as_no_wish,
-    beside_larger,
     is_off,
-    larger_balls,
     larger_instead,
+    of_ball_sizes,
     propose_intensity,
+    settings_beside,
     usual_for,
     with_expected_intensity,
     with_thin_places,
@@ -403,51 +404,62 @@ def pilot_of(intensity: float, seconds: float) -> Measured:
     return Measured(*common, intensity=predicted)
 
 
-def test_where_balls_are_too_weak_the_next_larger_ones_are_told_beside_them(
+def test_pilots_compare_larger_balls_up_to_those_that_give_the_intensity(
     plate: Path, shop: Shop
 ) -> None:
     """Balls of 1 mm give half of the least intensity, so that balls of 2 mm give it."""
     wanted, asked = Wanted("mm", shop=shop), WantedIntensity(0.10, 0.15)
+    made = propose(plate, replace(wanted, ball_mm=1.0), lambda _: [])
 
-    def again(other: Wanted) -> Proposal:
-        return propose(plate, other, lambda _: [])
+    def sizes(found: Measured | None, asked: WantedIntensity | None, small: float = 1.0) -> list:
+        return [one.ball_mm for one in settings_beside(made, wanted, asked, found, small)]
 
-    made = again(replace(wanted, ball_mm=1.0))
-    made = with_expected_intensity(made, None)
-    weak, seen = pilot_of(0.05, 600.0), list[Setting]()
+    weak = pilot_of(0.05, 600.0)
+    beside = settings_beside(made, wanted, asked, weak, 1.0)
+    assert beside == [Setting(1.5, 40.0), Setting(2.0, 40.0)]
+    assert sizes(pilot_of(0.02, 600.0), asked) == [1.5, 2.0, 3.0]
+    assert sizes(pilot_of(0.12, 600.0), asked) == [2.0]  # twice as large
+    assert sizes(pilot_of(0.12, 600.0), None) == [1.5, 2.0]
+    assert sizes(weak, asked, small=3.0) == [1.5, 2.0, 3.0]
+    assert sizes(None, asked) == []
+    assert settings_beside(made, replace(wanted, ball_mm=1.0), asked, weak, 1.0) == []
 
-    def measure(one: Proposal) -> Measured:
-        seen.append(setting_of(one))
-        return pilot_of(0.12, 100.0)
 
-    larger = larger_balls(made, wanted, asked, weak, again, measure)
-    assert larger is not None
-    assert seen == [Setting(2.0, 40.0)]
-    assert setting_of(larger[0]) == seen[0]
-    told = beside_larger(made, weak, *larger, "they jam")
-    assert told.design == made.design
-    text = told.reasons[INTENSITY]
-    assert "WITH LARGER BALLS, 2 mm at 40 µm: about 0.12 mmA, " in text
-    assert "% of the target touched, " in text
-    assert "% served, 98 % after about 100 s, beside about 0.05 mmA, " in text
-    assert text.endswith(", and both, one after the other, do not pay: they jam")
-    reason = larger_instead(made, weak, *larger, asked)
+def test_larger_balls_are_taken_that_give_the_intensity_and_are_no_slower(
+    plate: Path, shop: Shop
+) -> None:
+    wanted, asked = Wanted("mm", shop=shop), WantedIntensity(0.10, 0.15)
+    made, larger = (
+        propose(plate, replace(wanted, ball_mm=ball), lambda _: []) for ball in (1.0, 2.0)
+    )
+    now = Compared(made, pilot_of(0.05, 600.0))
+    good = Compared(larger, pilot_of(0.12, 100.0))
+    trials = of_ball_sizes([good, now])
+    assert [one.ball_mm for one in trials] == [1.0, 2.0]
+    assert [one.time_to_98 for one in trials] == [600.0, 100.0]
+    taken = larger_instead(now, [good], trials, asked)
+    assert taken is not None
+    assert taken.made.design == larger.design
+    reason = taken.made.reasons["shot.diameter_mm"]
     assert reason.startswith("LARGER BALLS FOR THE INTENSITY: they touch 100% of the target")
-    assert "98 % after about 100 s, as 1 mm at 40 µm with about 0.05 mmA do" in reason
-    other, strong = larger
-    unlike = replace(other, jams=(*made.jams, *other.jams, None))  # type: ignore[arg-type]
-    for there, pilot in (
-        (other, pilot_of(0.12, 700.0)),  # later
-        (other, pilot_of(0.2, 100.0)),  # beyond the range
-        (other, strong._replace(places=False)),  # on average alone
-        (other, strong._replace(intensity=None)),
-        (unlike, strong),  # balls jam
+    assert "than 1 mm at 40 µm, which are too weak; but 0% of it lies in fillets" in reason
+    strong = pilot_of(0.12, 100.0)
+    for other in (
+        Compared(larger, pilot_of(0.12, 700.0)),  # later
+        Compared(larger, pilot_of(0.2, 100.0)),  # beyond the range
+        Compared(larger, strong._replace(places=False)),  # on average alone
+        Compared(larger, strong._replace(intensity=None)),
+        Compared(larger, None, "balls jam in a gap"),
     ):
-        assert larger_instead(made, weak, there, pilot, asked) == ""
-    for enough in (pilot_of(0.12, 600.0), pilot_of(0.2, 600.0), None):
-        assert larger_balls(made, wanted, asked, enough, again, measure) is None
-    fixed = replace(wanted, ball_mm=1.0)
-    assert larger_balls(made, fixed, asked, weak, again, measure) is None
+        assert larger_instead(now, [other], trials, asked) is None
+    enough = Compared(made, pilot_of(0.12, 600.0))
+    assert larger_instead(enough, [good], trials, asked) is None
+    # The smallest that does it is taken.
+    (small,) = (Compared(propose(plate, replace(wanted, ball_mm=1.5), lambda _: []), strong),)
+    three = [good, small]
+    taken = larger_instead(now, three, of_ball_sizes([now, *three]), asked)
+    assert taken is not None
+    assert setting_of(taken.made).ball_mm == 1.5
 
 
 @pytest.mark.parametrize(("low", "taken"), [(0.25, 1.5), (0.35, 1.2)])

@@ -250,7 +250,7 @@ def test_a_part_that_lies_is_turned_over_where_that_is_quicker(
     np.testing.assert_allclose(*ends, atol=1e-12)  # the end in the wall stays in it
     assert [one.pieces_in_air for one in made.chamber.steps] == [0, 0]
     assert (
-        "by pilots 98 % after about 400 s, in one pose 98 % after about 900 s"
+        "by pilots with balls of 3 mm 98 % after about 400 s, in one pose 98 % after about 900 s"
         in (made.reasons[".steps"])
     )
     (tmp_path / "design.toml").write_text(design_text(made, tmp_path), "utf-8")
