@@ -243,6 +243,8 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     if INTENSITY in made.reasons:
         value = clauses(made.reasons[INTENSITY])[0][0].partition(": ")[0]
         yield "intensity", value, (INTENSITY,)
+        distance = f"{tables['chamber']['sonotrode_distance_mm']:g} mm from the sonotrode"
+        yield "strips", f"in the lid in place of the part, {distance}: chamberopt strip", ()
     accuracy = design.process.accuracy
     simulated = f"{accuracy.replicas} replicas of {plain(accuracy.simulated_time, 3)} s"
     keys = tuple(f"process.accuracy.{key}" for key in tables["process.accuracy"])

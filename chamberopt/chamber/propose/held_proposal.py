@@ -26,21 +26,31 @@ from chamberopt.chamber.propose.proposed_end import HeldEnd
 from chamberopt.chamber.propose.proposed_floor import Floor
 from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices
 from chamberopt.chamber.propose.proposed_mask import (
+    FLAT_DEG,
     are_holes,
     pads,
     rows_of,
     to_be_masked,
     to_be_plugged,
 )
-from chamberopt.chamber.propose.proposed_target import LONG, Target, area_in_mm2, named_or_all
+from chamberopt.chamber.propose.proposed_target import (
+    LONG,
+    Target,
+    apart,
+    area_in_mm2,
+    named_or_all,
+)
 from chamberopt.chamber.propose.shop import Shop
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import Progress
 from chamberopt.design.fixture import USUAL_SHELL_MM, WIDEST_GAP
+from chamberopt.geometry.faces import Faces
+from chamberopt.geometry.meshes.surface_error import format_point
 
 MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
 SEEN_OUT = 1e-3  # m by which a part stands out of a side
 MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area over the largest
+MOST_FLAT, LEAST_JAW = 20, 30e-6  # flat faces looked at for jaws; least area of each [m²]
 MOST_HOLDERS = 6  # that are tried
 CLEAR = 1.5  # distance of a mask from the target, over the diameter of a ball
 # Share of the target that a holder may keep from the balls; where no other holds the part.
@@ -121,14 +131,59 @@ def _outside_in_words(made: Proposal) -> str:
     # What is buried in another body of the part, or under a mask, is not outside.
     corners = part.vertices[part.triangles]
     is_beyond = ((corners < low) | (corners > high)).any(axis=(1, 2))
-    outside, areas = np.where(is_beyond, part.area - chamber.exposed_area, 0.0), {}
-    for one in named_or_all(made.known):
-        rows = rows_of(made.design, one.keys) & ~part.target
-        areas[one.name] = float(outside[rows].sum())
-    least = JAW_SHARE * max(areas.values(), default=0.0)
-    most = sorted((one for one in areas if areas[one] > least), key=lambda one: -areas[one])
-    jaws = ", ".join(f"{one} ({area_in_mm2(areas[one])} of it)" for one in most[:MOST_JAWS])
+    outside = np.where(is_beyond & ~part.target, part.area - chamber.exposed_area, 0.0)
+    if found := _flat_jaws(part.vertices, part.triangles, outside):
+        jaws = found
+    else:
+        known = (
+            (one, np.where(rows_of(made.design, one.keys), outside, 0.0))
+            for one in named_or_all(made.known)
+        )
+        areas = apart([(one, float(each.sum()), each) for one, each in known if each.any()])
+        most = [(one, area) for one, area in areas if area > JAW_SHARE * areas[0][1]]
+        jaws = ", ".join(
+            f"{one.name} ({area_in_mm2(area)} of it)" for one, area in most[:MOST_JAWS]
+        )
     return f"at {', '.join(sorted(sides))}{f' by {jaws}' if jaws else ''}"
+
+
+def _flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) -> str:
+    """Return in words the largest two flat faces, back to back, that stand out of a chamber.
+
+    The text is empty where there are none as large as jaws take.
+
+    Args:
+        vertices, triangles: the posed part [m].
+        outside: area of each triangle that may be clamped [m²], (m,).
+    """
+    faces = Faces(vertices, triangles, FLAT_DEG)
+    flat = np.linalg.norm(faces.area_vectors, axis=1) > np.cos(np.radians(FLAT_DEG)) * faces.area
+    free = np.where(flat, np.bincount(faces.of_triangle, outside, faces.count), 0.0)
+    largest = np.argsort(-free, kind="stable")[:MOST_FLAT]
+    best, text = LEAST_JAW, ""
+    for k, one in enumerate(largest):
+        for other in largest[k + 1 :]:
+            area = float(min(free[one], free[other]))
+            ways = faces.normal(int(one)), faces.normal(int(other))
+            if area <= best or ways[0] @ ways[1] > -np.cos(np.radians(FLAT_DEG)):
+                continue
+            places = faces.place(int(one)), faces.place(int(other))
+            if ways[0] @ (places[0] - places[1]) <= 0.0:  # the sides of a slot
+                continue
+            best = area
+            text = "jaws on its flat faces that look to " + " and ".join(
+                f"{_way_in_words(way)} ({area_in_mm2(float(free[face]))} of it)"
+                for way, face in zip(ways, (one, other), strict=True)
+            )
+    return text
+
+
+def _way_in_words(way: np.ndarray) -> str:
+    """Return a direction (3,) in the chamber in words, as an axis where it is along one."""
+    k = int(np.abs(way).argmax())
+    if abs(way[k]) > np.cos(np.radians(FLAT_DEG)):
+        return f"{'-' if way[k] < 0.0 else '+'}{'xyz'[k]}"
+    return format_point(way)
 
 
 def hangs_by_a_face(made: Proposal) -> bool:

@@ -419,7 +419,8 @@ def _needed(made: Proposal, off: float) -> str:
     allowed = "larger than" if off < 0.0 else "smaller than"
     return (
         f"it takes an amplitude of about {plain(amplitude, 2)} µm zero-to-peak, or balls of about "
-        f"{plain(ball, 2)} mm, {allowed} are proposed here (choose others: --ball-mm)"
+        f"{plain(ball, 2)} mm, {allowed} the target's fillets and slots allow by rule (--ball-mm "
+        "takes others)"
     )
 
 

@@ -18,11 +18,24 @@ from chamberopt.chamber.part import chosen_on_part, chosen_triangles
 from chamberopt.chamber.propose.pose import Turns
 from chamberopt.chamber.propose.proposal import Proposal, touched_share
 from chamberopt.chamber.propose.proposed_arbor import Bore
-from chamberopt.chamber.propose.proposed_target import RUNNING, Surface, area_in_mm2, named_or_all
+from chamberopt.chamber.propose.proposed_target import (
+    RUNNING,
+    Surface,
+    apart,
+    area_in_mm2,
+    named_or_all,
+)
 from chamberopt.design.design import Design
 from chamberopt.design.part import Selection
 from chamberopt.geometry.meshes.part_mesh import PartMesh
-from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, unit_vectors
+from chamberopt.geometry.triangles import (
+    area_vectors,
+    areas,
+    rotation_matrix,
+    side_pairs,
+    sides_of,
+    unit_vectors,
+)
 
 FLAT_DEG = 1.0  # largest angle in a flat face
 STRAIGHT_UP = 0.9998  # cosine from which on a face is level: balls lie on it
@@ -36,6 +49,12 @@ MOST_LOOKED_AT = 20  # surfaces, the largest
 # Share of the target's area from which on what is met of a surface is named, though most of it lies
 # outside of the chamber.
 PARTLY_MET = 0.05
+# Outer edges that turn by more [degrees] are sharp; the length of them that is told [m].
+SHARP, LEAST_EDGES = 45.0, 5e-3
+EDGES = (
+    " outer edges turn by more than 45 degrees in the file: break them before it is peened, as "
+    "dents roll a burr over them, or guard those that are thin (no source read)"
+)
 # Names of what fits to other parts, whose size and finish shot would change.
 NEVER = re.compile(
     r"(?<![a-z])(?:bores?|(?:\w+.)?holes?|threads?|(?:bearing|valve)?.?seats?|key.?ways?|splines?)"
@@ -158,11 +177,32 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     hidden = 1.0 - touched_share(proposal)
     if hidden > LEAST and not part.target.reachable:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
+    posed = proposal.chamber.part
+    if (sharp := sharp_edges(posed.vertices, posed.triangles, posed.target)) > LEAST_EDGES:
+        found.append(LeftOut({}, f"SHARP EDGES, {1e3 * sharp:.3g} mm of the target's{EDGES}"))
     beside = [one for one in proposal.known if not np.any(one.triangles & target)]
     names = {one.name for one in [*beside, *_bodies_of(proposal, target, beside)]}
     others = [one for one in proposal.known if one.name in names]
     found += _met_beside(proposal, others[:MOST_LOOKED_AT], float(area[target].sum()))
     return found
+
+
+def sharp_edges(vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> float:
+    """Return the length [m] of the outer edges of a target that turn by more than SHARP.
+
+    Args:
+        vertices, triangles: the part [m].
+        target: marks its triangles that are peened, (m,).
+    """
+    one, two = side_pairs(triangles).T
+    normals = unit_vectors(area_vectors(vertices, triangles))
+    start, end = vertices[sides_of(triangles)[one]].transpose(1, 0, 2)
+    one, two = one // 3, two // 3
+    turned = np.einsum("ij,ij->i", normals[one], normals[two]) < np.cos(np.radians(SHARP))
+    falls = vertices[triangles[two]].mean(axis=1) - start
+    outer = np.einsum("ij,ij->i", falls, normals[one]) < 0.0
+    rows = turned & outer & (target[one] | target[two])
+    return float(np.linalg.norm(end - start, axis=1)[rows].sum())
 
 
 def _bodies_of(
@@ -196,14 +236,15 @@ def _met_beside(
         target_area: area of the target [m²].
     """
     design, chamber = proposal.design, proposal.chamber
-    areas_of = ((one, met_area(design, chamber, one)) for one in named_or_all(others))
-    met = [
-        (one, inside, whole)
-        for one, (inside, whole) in areas_of
-        if inside > min(MET * whole, PARTLY_MET * target_area)
-    ]
-    if not met:
+    found, wholes = [], {}
+    for one in named_or_all(others):
+        rows = rows_of(design, one.keys) & ~chamber.part.target
+        inside, wholes[one.name] = met_area(design, chamber, one)
+        if inside > min(MET * wholes[one.name], PARTLY_MET * target_area):
+            found.append((one, inside, np.where(rows, chamber.exposed_area, 0.0)))
+    if not found:
         return
+    met = [(one, inside, wholes[one.name]) for one, inside in apart(found)]
     met.sort(key=lambda one: (not RUNNING.search(one[0].name), one[1] <= MET * one[2]))
     names = [
         f"{one.name} ({area_in_mm2(inside)}{'' if inside > NEARLY_ALL * whole else ' of it'})"

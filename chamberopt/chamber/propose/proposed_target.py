@@ -32,6 +32,7 @@ SIDE_GAP, GAP_SHARE, MIN_GAP = 5.0, 0.15, 4e-3
 DISTANCE, DISTANCE_SHARE, MIN_DISTANCE = 6.0, 0.2, 8e-3
 ABOVE = 5.0  # ball diameters between target and ceiling
 SHAPES = ("cylinder", "box", "prism", "conformal")
+TOLD = 0.5  # share of a surface that others named tell of, from which on it is not named
 LONG = 1.6  # least length over width of a part whose sides the walls follow
 SIDES = 6  # of a prism
 
@@ -465,6 +466,23 @@ def _joined(chosen: Sequence[Surface], reason: str) -> Target:
 def named_or_all(known: Sequence[Surface]) -> Sequence[Surface]:
     """Return the surfaces that have a name in the part's file; all if none has."""
     return [one for one in known if "surface" in one.keys] or known
+
+
+def apart(areas: Sequence[tuple[Surface, float, np.ndarray]]) -> list[tuple[Surface, float]]:
+    """Return surfaces with their areas, the largest first, without those made of the others.
+
+    A body is left out where its faces are named too, and a colour where names say the same.
+
+    Args:
+        areas: surfaces, the area that counts of each, and the area of each triangle in it, (m,).
+    """
+    kept: list[tuple[Surface, float]] = []
+    told = np.zeros_like(areas[0][2]) if areas else np.empty(0)
+    for one, area, each in sorted(areas, key=lambda one: (one[0].name.startswith("#"), one[1])):
+        if each[told > 0.0].sum() <= TOLD * area:
+            kept.append((one, area))
+            told = np.maximum(told, each)
+    return sorted(kept, key=lambda one: -one[1])
 
 
 def area_in_mm2(area: float) -> str:

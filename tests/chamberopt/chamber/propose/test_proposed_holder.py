@@ -11,11 +11,12 @@ from manifold3d import CrossSection, Manifold
 
 from chamberopt.chamber.propose import held_proposal
 from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.held_proposal import _flat_jaws
 from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.propose.proposed_end import held_end
 from chamberopt.chamber.propose.proposed_holder import HolderChoice, end_holder, holder_choices
 from chamberopt.chamber.propose.proposed_mask import find_left_out
-from chamberopt.chamber.propose.proposed_target import WHOLE, Surface, Target
+from chamberopt.chamber.propose.proposed_target import WHOLE, Surface, Target, apart
 from chamberopt.chamber.propose.text import clauses, design_text
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
@@ -235,7 +236,8 @@ def test_what_is_seldom_peened_is_named_or_masked(tmp_path: Path, side: str) -> 
         assert not any("BORE" in one.text for one in left_out)
         assert "[mask]\nthickness_mm = 1  # a cap on BORE: not to be peened" in text
         return
-    (said,) = left_out
+    sharp, said = left_out
+    assert sharp.text.startswith("SHARP EDGES, 80 mm of the target's outer edges")
     assert made.design.mask is None
     assert said.text.startswith("NOT MASKED: the shot also meets FLANGE")
     assert said.text in tomllib.loads(text)["to_settle"]
@@ -250,7 +252,7 @@ def test_the_rest_of_a_body_is_met_beside_a_target_that_is_a_face_of_it(tmp_path
     part = tmp_path / "box.obj"
     part.write_text("\n".join(lines) + "\n")
     made = propose(part, Wanted("mm"), lambda _: ["face 2.1"])
-    (said,) = (one.text for one in find_left_out(made) if not one.keys)
+    _, said = (one.text for one in find_left_out(made) if not one.keys)
     assert said.startswith("NOT MASKED: the shot also meets KEY (360 mm² of it), SHAFT (1080 mm²")
     named = propose(part, Wanted("mm"), lambda _: ["SHAFT"])
     assert not any("SHAFT" in one.text for one in find_left_out(named) if not one.keys)
@@ -277,3 +279,34 @@ def test_what_is_buried_in_another_body_is_no_jaw(monkeypatch: pytest.MonkeyPatc
     made = SimpleNamespace(design=None, chamber=chamber, known=known)
     words = held_proposal._outside_in_words(made)  # type: ignore[arg-type]
     assert words == "at +z by SHAFT (500000 mm² of it)"
+
+
+def test_jaws_close_on_flat_faces_back_to_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A channel: its flanges' inner faces look at each other, so that no jaws close on them."""
+    channel = trimesh.creation.box((60, 40, 30))
+    groove = trimesh.creation.box((70, 30, 30))
+    groove.apply_translation((0.0, 0.0, 5.0))
+    mesh = trimesh.boolean.difference([channel, groove])
+    area = mesh.area_faces * 1e-6
+    across = np.abs(mesh.face_normals[:, 1]) > 0.9
+    jaws = _flat_jaws(1e-3 * mesh.vertices, mesh.faces, np.where(across, area, 0.0))
+    assert jaws.startswith("jaws on its flat faces that look to ")
+    assert {"+y (1800 mm² of it)", "-y (1800 mm² of it)"} == {
+        one.strip() for one in jaws.partition("look to ")[2].split(" and ")
+    }
+    inner = across & (np.abs(mesh.triangles_center[:, 1]) < 16.0)
+    assert _flat_jaws(1e-3 * mesh.vertices, mesh.faces, np.where(inner, area, 0.0)) == ""
+    ball = trimesh.creation.icosphere(3, radius=20.0)
+    assert _flat_jaws(1e-3 * ball.vertices, ball.faces, 1e-6 * ball.area_faces) == ""
+
+
+def test_a_body_is_not_named_beside_its_faces() -> None:
+    def surface(name: str) -> Surface:
+        return Surface(name, {"surface": [name]}, np.ones(4, bool), "")
+
+    area = np.array([4.0, 3.0, 2.0, 1.0])
+    rows = {"BODY": [0, 1, 2], "FRONT": [0], "#ff0000": [0, 3], "REAR": [1]}
+    each = {name: np.where(np.isin(np.arange(4), one), area, 0.0) for name, one in rows.items()}
+    told = [(surface(name), float(one.sum()), one) for name, one in each.items()]
+    assert [(one.name, size) for one, size in apart(told)] == [("FRONT", 4.0), ("REAR", 3.0)]
+    assert apart([]) == []

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.propose.proposed_mask import NEVER, pads
+from chamberopt.chamber.propose.proposed_mask import NEVER, pads, sharp_edges
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
 
@@ -43,3 +43,17 @@ def test_a_pad_stands_on_level_tops_beside_the_target() -> None:
     assert [at["at_mm"][2] for at in only["faces"]] == [25.0]
     assert pads(mesh, below, (30.0, 0.0, 0.0), 1e-3) == []
     assert pads(mesh, below, (0.0, 0.0, 0.0), 0.05) == []  # no ball finds room
+
+
+def test_sharp_edges_are_those_of_the_target_that_turn_outwards() -> None:
+    """A step of 8 on a base: a top of 40 x 40 mm has four outer edges, its inner ones are none."""
+    base, step = trimesh.creation.box((80, 80, 8)), trimesh.creation.box((40, 40, 8))
+    step.apply_translation((0.0, 0.0, 8.0))
+    both = trimesh.boolean.union([base, step])
+    normal = both.face_normals[:, 2]
+    top = (normal > 0.9) & (both.triangles_center[:, 2] > 11.0)
+    ground = (normal > 0.9) & (both.triangles_center[:, 2] < 5.0)
+    for target, length in ((top, 160.0), (ground, 320.0), (top | ground, 480.0)):
+        assert sharp_edges(1e-3 * both.vertices, both.faces, target) == pytest.approx(1e-3 * length)
+    ball = trimesh.creation.icosphere(3)
+    assert sharp_edges(ball.vertices, ball.faces, np.ones(len(ball.faces), bool)) == 0.0
