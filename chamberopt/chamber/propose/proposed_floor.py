@@ -36,7 +36,9 @@ FARTHER = 1.5  # factor by which the sonotrode's distance may grow, so that wall
 WIDEST = 25e-3  # m: how far a leaning wall may move out up to the ceiling
 HELD = 1e-9  # m: a floor that must move in by no more lies within a face
 LEAST_ROOM = 4.0  # ball diameters beside the part that save a sonotrode
-WHOLE = 1.25  # a face up to so much larger than the wanted floor becomes the whole floor
+# A face up to so much larger than the wanted floor becomes the whole floor: of one sonotrode, and
+# of blocks side by side, where an end without a part would only thin out the shot.
+WHOLE, WHOLE_OF_BLOCKS = 1.25, 1.1
 
 
 def of_blocks(ball: float) -> str:
@@ -214,11 +216,12 @@ def _over_the_face(sizes: Sizes, shop: Shop, face: Face) -> Floor:
     if sizes.shape == "cylinder":
         plan = {"diameter_mm": face.sides_mm[0]}
     is_disc = face.sonotrode.size_mm is None
+    most = WHOLE if face.blocks is None else WHOLE_OF_BLOCKS
     alike = (sizes.shape, is_disc) in (("cylinder", True), ("box", False))
     if (
         alike
         and not sizes.is_fixed
-        and all(plan[key] <= WHOLE * float(sizes.plan[key]) for key in plan)
+        and all(plan[key] <= most * float(sizes.plan[key]) for key in plan)
     ):
         more = min(plan[key] - float(sizes.plan[key]) for key in plan)
         wider = replace(sizes, plan={**sizes.plan, **plan}, gap=sizes.gap + 5e-4 * more)

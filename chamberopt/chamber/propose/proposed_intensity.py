@@ -335,6 +335,8 @@ def is_off(made: Proposal, predicted: PredictedIntensity | None) -> bool:
 def as_no_wish(made: Proposal) -> Proposal:
     """Return a proposal for an intensity that nobody asked for, without that wish in its design."""
     reasons = dict(made.reasons)
+    if INTENSITY not in reasons:  # no pilot told it
+        return made
     reasons[INTENSITY] += "; to keep the largest amplitude: --intensity none"
     process = {k: one for k, one in made.tables["process"].items() if k != "intensity_mmA"}
     return replace(

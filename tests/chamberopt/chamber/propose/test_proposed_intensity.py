@@ -358,6 +358,7 @@ def test_a_usual_intensity_is_aimed_at_and_is_no_wish(plate: Path, shop: Shop) -
     aimed = propose_intensity(
         made, wanted, usual_for(made), lambda one: propose(plate, one, lambda _: []), law.simulate
     )
+    assert as_no_wish(made) == made  # no pilot told an intensity
     free = as_no_wish(aimed)
     assert free.design.process.intensity_mmA is None
     assert "intensity_mmA" not in free.tables["process"]

@@ -131,9 +131,12 @@ def test_blocks_side_by_side_carry_what_no_sonotrode_does(
 
 
 def test_a_floor_is_made_narrower_where_that_saves_blocks() -> None:
+    """The wall ends over blocks of which an end would be empty; it goes round those nearly filled."""
     plan: dict[str, float | str] = {"length_mm": 170.0, "width_mm": 66.0}
     found = floor(plan, "box", shop(DISC, SQUARE), gap=0.01)
-    assert found.sizes.plan == {"length_mm": 200.0, "width_mm": 60.0}
+    assert found.sizes.plan == {"length_mm": 170.0, "width_mm": 60.0}
+    nearly = floor({**plan, "length_mm": 190.0}, "box", shop(DISC, SQUARE), gap=0.01)
+    assert nearly.sizes.plan == {"length_mm": 200.0, "width_mm": 60.0}
     assert found.blocks == Blocks(size_mm=(50.0, 60.0), columns=4, rows=1)
     assert found.sizes.gap == pytest.approx(0.01 - 3e-3 + 0.0)
 
