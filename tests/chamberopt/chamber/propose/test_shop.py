@@ -131,7 +131,7 @@ def test_blocks_side_by_side_carry_what_no_sonotrode_does(
 
 
 def test_a_floor_is_made_narrower_where_that_saves_blocks() -> None:
-    """The wall ends over blocks of which an end would be empty; it goes round those nearly filled."""
+    """The wall goes round blocks that are nearly filled, and ends over others."""
     plan: dict[str, float | str] = {"length_mm": 170.0, "width_mm": 66.0}
     found = floor(plan, "box", shop(DISC, SQUARE), gap=0.01)
     assert found.sizes.plan == {"length_mm": 170.0, "width_mm": 60.0}
