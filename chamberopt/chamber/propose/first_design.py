@@ -306,7 +306,8 @@ def _proposed(
             except UnreadableError:
                 raise
             except InputError as error:
-                refused = refused or error
+                # Its frames hold bodies of manifold3d, which complains of what a cycle keeps to the end.
+                refused = refused or error.with_traceback(None)
                 continue
             if best is None or faults(made) < faults(best[0]):
                 best = made, floor
@@ -510,7 +511,7 @@ def _place(
                 x, y = np.round(1e3 * (middle_in_plan(posed) - middle), 2) + 0.0
                 floor = floor._replace(offset_mm=(float(x), float(y)))
         except InputError as error:
-            refused = refused or error
+            refused = refused or error.with_traceback(None)
             continue
         found.append((placed, floor))
     if refused and not found:

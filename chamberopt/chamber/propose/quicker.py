@@ -159,7 +159,7 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
     """Return the best way with the times of all poses in the reason for its pose."""
 
     def named(one: Way) -> str:
-        over = ", turned over" if one.wanted.turned_over else ""
+        over = " and turned over" if one.wanted.turned_over else ""
         return (one.wanted.pose or "evenly exposed").replace("-", " ") + over
 
     texts = []
@@ -168,7 +168,7 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
         what = harm or _said(one.found)
         count = one.made.sonotrode_count
         on, taken = f" on {count} sonotrodes" if count > 1 else "", " (taken)" * (one is best)
-        texts.append(f"{name}{on} {what}{taken}")
+        texts.append(f"{name}{on}: {what}{taken}")
     if len(texts) == 1:
         return best
     pose, _, why = best.made.reasons["part.rotate_deg"].rpartition(": ")

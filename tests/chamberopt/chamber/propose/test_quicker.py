@@ -119,7 +119,7 @@ def test_the_quicker_pose_is_taken_and_all_times_are_told(
     assert best.wanted.pose == "on-edge"
     assert best.found == measured(512.0)
     told = best.made.reasons["part.rotate_deg"]
-    for text in ("evenly exposed 98 % after about 2000 s", "on edge on", "98 % after about 510 s"):
+    for text in ("evenly exposed: 98 % after about 2000 s", "on edge on", "98 % after about 510 s"):
         assert text in told
 
 
@@ -141,7 +141,7 @@ def test_a_lying_part_on_which_balls_would_rest_is_tried_turned_over(
     best = propose_quicker(Way(poses[None], Wanted("mm"), measured(2024.0)), again, measure)
     assert best.wanted == Wanted("mm", pose="lying", turned_over=True)
     assert best.found == measured(400.0)
-    assert "lying, turned over on" in best.made.reasons["part.rotate_deg"]
+    assert "lying and turned over on" in best.made.reasons["part.rotate_deg"]
     assert best.made.reasons[".steps"].startswith("turned over after half of the time")
     # What was turned over already is not turned over again.
     kept = propose_second_pose(best.made, uneven(900.0), lambda *_: measured(1.0))
