@@ -306,7 +306,7 @@ def _proposed(
             except UnreadableError:
                 raise
             except InputError as error:
-                # Its frames hold bodies of manifold3d, which complains of what a cycle keeps to the end.
+                # Its frames hold bodies, of which manifold3d complains at the end of the process.
                 refused = refused or error.with_traceback(None)
                 continue
             if best is None or faults(made) < faults(best[0]):
