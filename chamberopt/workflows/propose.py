@@ -282,7 +282,8 @@ class _Pilots:
             two, why = with_finer_balls(coarse.made, coarse.found, by_geometry, quietly)
             if two is not None:
                 return replace(with_thin_places(two), trials=trials)
-            now = larger_instead(now, others, trials, asked) or now
+            if taken := larger_instead(now, others, trials, asked):
+                now = taken._replace(found=quietly(taken.made) or taken.found)
             now = now._replace(made=without_finer(now.made, why))
         return replace(_in_budget(now.made, now.found), trials=trials)
 
@@ -324,7 +325,7 @@ class _Pilots:
         made = _told(with_amplitude(made, setting), why_so)
         if harm := new_harm(made, now.made):
             return Compared(made, None, harm)
-        found = self._measure(made, is_told=False)
+        found = self._measure(made, is_told=False, is_brief=True)
         if found is not None and found.intensity:
             found = found._replace(intensity=found.intensity.times(scale))
         if asked and found and found.intensity:

@@ -50,7 +50,8 @@ from chamberopt.geometry.meshes.surface_error import format_point
 MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
 SEEN_OUT = 1e-3  # m by which a part stands out of a side
 MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area over the largest
-MOST_FLAT, LEAST_JAW = 20, 30e-6  # flat faces looked at for jaws; least area of each [m²]
+# Flat faces looked at for jaws; least area of each [m²]; of two, share of all that stands out.
+MOST_FLAT, LEAST_JAW, LEAST_OF_ALL = 20, 30e-6, 0.15
 MOST_HOLDERS = 6  # that are tried
 CLEAR = 1.5  # distance of a mask from the target, over the diameter of a ball
 # Share of the target that a holder may keep from the balls; where no other holds the part.
@@ -165,7 +166,8 @@ def _flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray)
         for other in largest[k + 1 :]:
             area = float(min(free[one], free[other]))
             ways = faces.normal(int(one)), faces.normal(int(other))
-            if area <= best or ways[0] @ ways[1] > -np.cos(np.radians(FLAT_DEG)):
+            is_little = free[one] + free[other] < LEAST_OF_ALL * outside.sum()
+            if is_little or area <= best or ways[0] @ ways[1] > -np.cos(np.radians(FLAT_DEG)):
                 continue
             places = faces.place(int(one)), faces.place(int(other))
             if ways[0] @ (places[0] - places[1]) <= 0.0:  # the sides of a slot

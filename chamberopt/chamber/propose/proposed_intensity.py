@@ -185,6 +185,8 @@ def settings_beside(
     most_tried = MOST_TRIED if off < 0.0 else 2 if intensity is None else 1
     some = np.unique(np.linspace(len(larger) - 1, 0, most_tried).round().astype(int))
     sizes = {by_geometry, *(larger[k] for k in some if larger)} - {now.ball_mm}
+    if intensity is not None and off >= 0.0 and by_geometry > now.ball_mm:
+        sizes = {by_geometry}  # it is reached, and these tell what larger ones do
 
     def with_amplitude_for(ball: float) -> Setting:
         if intensity is None or known is None:

@@ -420,6 +420,7 @@ def test_pilots_compare_larger_balls_up_to_those_that_give_the_intensity(
     assert beside == [Setting(1.5, 40.0), Setting(2.0, 40.0)]
     assert sizes(pilot_of(0.02, 600.0), asked) == [1.5, 2.0, 3.0]
     assert sizes(pilot_of(0.12, 600.0), asked) == [2.0]  # twice as large
+    assert sizes(pilot_of(0.12, 600.0), asked, small=3.0) == [3.0]
     assert sizes(pilot_of(0.12, 600.0), None) == [1.5, 2.0]
     assert sizes(weak, asked, small=3.0) == [1.5, 2.0, 3.0]
     assert sizes(None, asked) == []
