@@ -2,12 +2,14 @@
 import { ask, element } from "./state.js";
 
 const EVERY = 500; // ms between looks at a command
+const SHORT = 3; // s of a step before anything is said of its time
 
 // Show each status of a command until its end, and give the last; `started` is by default that of the last command.
 export async function followed(show, started) {
   let now = started ?? await ask("/status");
   if (!now.command) return null;
   document.body.dataset.ended = "";
+  begun.clear();
   while (now.exit === null) {
     show(now);
     await new Promise((done) => { setTimeout(done, EVERY); });
@@ -18,28 +20,35 @@ export async function followed(show, started) {
   return now;
 }
 
-// The time that is left of a step, from the pace since it was first seen; "" before a tenth is done.
+const inWords = (seconds) => seconds < 90 ? `${Math.ceil(seconds / 5) * 5} s` : `${Math.ceil(seconds / 60)} min`;
+
+// The time that is left of a step, by its pace since the first of it was done; until then, for how long it has gone on.
+// Of the item that is under way the part counts that the step within has done.
 const begun = new Map();
-function left({ step, done, total }) {
-  const now = performance.now() / 1000, first = begun.get(step);
-  if (!first || done < first.done) begun.set(step, { done, at: now });
-  if (!first || !total || done >= total || done <= first.done || done < total / 10) return "";
-  const seconds = (now - first.at) * (total - done) / (done - first.done);
-  return `, about ${seconds < 90 ? `${Math.ceil(seconds / 5) * 5} s` : `${Math.ceil(seconds / 60)} min`} left`;
+function time({ step, done, total }, within) {
+  const now = performance.now() / 1000, begin = begun.get(step) ?? { since: now, done: 0 };
+  const part = within?.total ? within.done / within.total : 0, all = done + part;
+  if (all < begin.done || !begin.done) Object.assign(begin, { done: all, at: now }); // compiling is no part of the pace
+  begun.set(step, begin);
+  if (now - begin.since < SHORT || (total && done >= total)) return "";
+  const seconds = (now - begin.at) * (total - all) / (all - begin.done);
+  if (!total || now - begin.at < SHORT || !(seconds < Infinity)) return `, for ${inWords(now - begin.since)} so far`;
+  return `, ${all < total / 10 ? "roughly" : "about"} ${inWords(seconds)} left`;
 }
 
 // For how long a command has worked.
-export const sinceBegin = (seconds) => seconds < 120 ? `at work for ${seconds} s` : `at work for ${Math.floor(seconds / 60)} min`;
+export const sinceBegin = (seconds) => seconds < 120 ? `at work for ${seconds} s` : `at work for ${Math.floor(seconds / 60)} min ${seconds % 60} s`;
+
+const words = (one, within) => `${one.step}${one.total ? `: ${Math.floor(one.done)} of ${one.total}` : one.done ? `: ${Math.floor(one.done)} so far` : ""}${one.best === null ? "" : `, best ${one.best.toFixed(4)}`}${time(one, within)}`;
 
 // A command in stages as a line of its stage and what is being done of it, and a bar.
 export const stage = ([first, ...inner]) => {
-  const last = inner.at(-1), now = last ? ` (${last.step}${!last.total && last.done ? `: ${Math.floor(last.done)} so far` : ""})` : "";
-  return [element("div", {}, `${first.step}${now}`, element("progress"))];
+  const last = inner.at(-1);
+  return [element("div", {}, last ? `${first.step} (${words(last)})` : `${first.step}${time(first)}`, element("progress"))];
 };
 
 export const bars = (steps) => {
   for (const step of begun.keys()) if (!steps.some((one) => one.step === step)) begun.delete(step);
-  return steps.map((one) => element("div", {},
-    `${one.step}${one.total ? `: ${Math.floor(one.done)} of ${one.total}` : one.done ? `: ${Math.floor(one.done)} so far` : ""}${one.best === null ? "" : `, best ${one.best.toFixed(4)}`}${left(one)}`,
+  return steps.map((one, k) => element("div", {}, words(one, steps[k + 1]),
     Object.assign(element("progress"), one.total ? { max: one.total, value: one.done } : {})));
 };

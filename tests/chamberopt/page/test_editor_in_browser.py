@@ -66,6 +66,37 @@ def test_a_number_changes_the_shape_the_facts_and_one_line(opened: Page) -> None
     assert said == [one.text for one in told]
 
 
+def test_a_young_run_tells_the_time_that_is_left(opened: Page) -> None:
+    """Of 24 replicas 0.2 are done in 8 s, after nothing in 9 s; then half an evaluation in 6 s.
+
+    The clock is the test's.
+    """
+    told = """async (looks) => {
+      const { bars } = await import("/browser/steps.js"), own = performance.now;
+      try {
+        return looks.map(([at, steps]) => {
+          performance.now = () => 1e3 * at;
+          return bars(steps.map((one) => ({ best: null, ...one }))).map((one) => one.textContent);
+        });
+      } finally { performance.now = own; }
+    }"""
+    replicas = {"step": "replicas", "total": 24}
+    looks = [[at, [replicas | {"done": done}]] for at, done in ((0, 0), (9, 0), (10, 0.1))]
+    looks += [[18, [replicas | {"done": 0.3}]], [19, [{"step": "drawing", "done": 0, "total": 0}]]]
+    young = {"step": "evaluations", "done": 0, "total": 10}
+    looks += [[at, [young, replicas | {"done": done}]] for at, done in ((20, 0), (21, 6), (26, 12))]
+    assert opened.page.evaluate(told, looks) == [
+        ["replicas: 0 of 24"],
+        ["replicas: 0 of 24, for 10 s so far"],
+        ["replicas: 0 of 24, for 10 s so far"],
+        ["replicas: 0 of 24, roughly 16 min left"],
+        ["drawing"],
+        ["evaluations: 0 of 10", "replicas: 0 of 24"],
+        ["evaluations: 0 of 10", "replicas: 6 of 24"],
+        ["evaluations: 0 of 10, roughly 4 min left", "replicas: 12 of 24, about 10 s left"],
+    ]
+
+
 def test_a_section_is_filled_in_the_colours_of_the_legend(opened: Page) -> None:
     """The part is a cube of 16 mm in a cylinder of 40 mm, whose wall is 1.7 mm thick there."""
     page, legend = opened.page, opened.page.locator("#legend")
