@@ -126,16 +126,17 @@ def cpu_seconds(call: Callable[[], Any]) -> tuple[float, Any]:
     return time.process_time() - before, result
 
 
-# What the columns of the tables are, in the picture.
+# What the columns of the tables are, in the picture: the quantity, and its words.
+TIME, RATE, MEMORY = "time [s]", "million collisions per CPU s", "peak of the memory [MB]"
 WORDS = {
-    "first_cpu_s": "first set-up [CPU s]",
-    "again_cpu_s": "each further set-up [CPU s]",
-    "packing_cpu_s": "placing the balls [CPU s]",
-    "M_collisions_per_cpu_s": "million collisions per CPU s",
-    "cpu_s": "evaluation [CPU s]",
-    "wall_s": "evaluation [s by the clock]",
-    "figures_s": "its figures [s]",
-    "peak_MB": "peak of the memory [MB]",
+    "first_cpu_s": (TIME, "first set-up, CPU"),
+    "again_cpu_s": (TIME, "each further set-up, CPU"),
+    "packing_cpu_s": (TIME, "placing the balls, CPU"),
+    "cpu_s": (TIME, "evaluation, CPU"),
+    "wall_s": (TIME, "evaluation, by the clock"),
+    "figures_s": (TIME, "its figures"),
+    "peak_MB": (MEMORY, ""),
+    "M_collisions_per_cpu_s": (RATE, ""),
 }
 KINDS: dict[str, tuple[Callable[[int], dict[str, Any]], tuple[int, ...]]] = {
     "triangles": (triangles, (100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000)),

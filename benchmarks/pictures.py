@@ -70,37 +70,51 @@ def lines_picture(
 
 
 def growth_picture(
-    path: Path, tables: dict[str, Sequence[dict[str, Any]]], words: dict[str, str]
+    path: Path, tables: dict[str, Sequence[dict[str, Any]]], words: dict[str, tuple[str, str]]
 ) -> None:
-    """A panel for each table, two in a row: all columns against the first, and a line of slope 1.
+    """A column for each table, a row for each quantity: all of it against the table's first column.
+
+    Times have a line in proportion to the first column.
 
     Args:
-        words: what a column is, by its name.
+        words: the quantity of a column, and its words where its row has several, by its name.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
 
-    lines = -(-len(tables) // 2)
-    figure = Figure(figsize=(10.0, 4.8 * lines), dpi=110, layout="constrained")
+    quantities = list(dict.fromkeys(quantity for quantity, _ in words.values()))
+    figure = Figure(figsize=(3.4 * len(tables), 8.6), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
-    panels = figure.subplots(lines, 2, squeeze=False).ravel()
-    for axes in panels[len(tables) :]:
-        axes.set_visible(False)
-    for axes, (kind, rows) in zip(panels, tables.items(), strict=False):
+    grid = figure.subplots(
+        len(quantities), len(tables), sharex="col", sharey="row", squeeze=False,
+        height_ratios=[2, *[1] * (len(quantities) - 1)],
+    )  # fmt: skip
+    for column, (kind, rows) in zip(grid.T, tables.items(), strict=True):
         across, *others = rows[0]
         sizes = np.array([row[across] for row in rows])
-        for name, colour, mark in zip(others, COLOURS, MARKS, strict=False):
-            label = words[name]
-            values = [row[name] for row in rows]
-            axes.loglog(sizes, values, marker=mark, color=colour, lw=1.6, label=label)
-        low = min(rows[0][name] for name in others)
-        line = {"color": "#bbbbbb", "lw": 1, "ls": "--", "label": "in proportion"}
-        axes.loglog(sizes, low * sizes / sizes[0], **line)
-        axes.set_title(f"Cost by number of {kind}", loc="left")
-        axes.set_xlabel(f"number of {across}")
-        axes.grid(which="major", color="#dddddd", lw=0.7)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(
-            frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=2
-        )
+        for axes, quantity in zip(column, quantities, strict=True):
+            own = [name for name in others if words[name][0] == quantity]
+            for name, colour, mark in zip(own, COLOURS, MARKS, strict=False):
+                values = [row[name] for row in rows]
+                label = words[name][1]
+                axes.loglog(sizes, values, marker=mark, color=colour, lw=1.6, label=label)
+            axes.grid(which="major", color="#dddddd", lw=0.7)
+            axes.spines[["top", "right"]].set_visible(False)
+            axes.set_visible(bool(own))
+        low = min(rows[0][name] for name in others if words[name][0] == quantities[0])
+        line = {"color": "#999999", "lw": 1, "ls": "--", "label": f"in proportion to {kind}"}
+        column[0].loglog(sizes, low * sizes / sizes[0], **line)
+        column[0].set_title(f"by number of {kind}", loc="left")
+        column[0].legend(frameon=False, fontsize=8.5, loc="upper left")
+        last = max(k for k, axes in enumerate(column) if axes.get_visible())
+        column[last].set_xlabel(f"number of {across}")
+        column[last].tick_params(labelbottom=True)
+    for axes, quantity in zip(grid[:, 0], quantities, strict=True):
+        low, high = np.log10(axes.get_ylim())
+        axes.set_ylim(10 ** np.floor(low), 10 ** np.ceil(high))
+        axes.yaxis.set_minor_formatter(NullFormatter())
+        axes.set_ylabel(quantity)
+    low, high = grid[0, 0].get_ylim()
+    grid[0, 0].set_ylim(low, 30 * high)  # room for the legends
     figure.savefig(path)

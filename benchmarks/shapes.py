@@ -1,6 +1,7 @@
 """Draws the shapes of docs/how_to/chambers.md: python benchmarks/shapes.py"""
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,12 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.pictures import IMAGES
 from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.part import Part
 from chamberopt.design.design import Design
 from chamberopt.design.shapes import TAG_SONOTRODE, ShapeSurface
 from chamberopt.pictures.charts.colours import EDGES, GLASS, PART_GREY, SONOTRODE
+from chamberopt.pictures.view import render_view
+from chamberopt.results.vtp_files import pyvista
 
 SHOWN: dict[str, dict[str, Any]] = {
     "cylinder": {"diameter_mm": 60, "height_mm": 57, "corner_radius_mm": 8},
@@ -48,29 +52,34 @@ HEADINGS = {
     "conformal, silhouette": "walls that follow its outline",
     "shapes/oblong.py": "a shape of your own",
 }
-LIGHT = np.array([0.5, -0.7, 0.5]) / np.sqrt(0.99)
+EYE = np.array([0.55, -0.85, 0.42])
+SIZE, BORDER = (520, 560), 12  # pixels of an image, and free round what it shows
 
 
 def main() -> None:
     """Writes docs/images/shapes.png."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
 
-    figure = Figure(figsize=(12.0, 7.2), dpi=90)
+    figure = Figure(figsize=(12.0, 7.4), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
-    for number, (title, keys) in enumerate(SHOWN.items(), start=1):
-        axes = figure.add_subplot(2, 4, number, projection="3d", computed_zorder=False)
-        _draw(axes, *_made(title, keys))
-        axes.set_title(HEADINGS[title], y=1.03, fontsize=12)
-    figure.subplots_adjust(0.0, 0.0, 1.0, 0.94, 0.0, 0.12)
+    made = [_made(title, keys) for title, keys in SHOWN.items()]
+    around = np.concatenate([1e3 * cavity.vertices for cavity, _ in made])  # all at one scale
+    for axes, title, one in zip(figure.subplots(2, 4).flat, SHOWN, made, strict=True):
+        view = render_view(partial(_add, *one), EYE, around, SIZE, BORDER)
+        axes.imshow(view.image)
+        axes.set_title(HEADINGS[title], fontsize=12)
+        axes.set_axis_off()
+    names = {"part": PART_GREY, "chamber wall": GLASS, "sonotrode": SONOTRODE}
+    patches = [Patch(facecolor=colour, label=name) for name, colour in names.items()]
+    figure.legend(handles=patches, loc="outside lower center", ncols=3, frameon=False, fontsize=12)
+    figure.get_layout_engine().set(h_pad=0.1)
     figure.savefig(IMAGES / "shapes.png")
 
 
-def _made(title: str, keys: dict[str, Any]) -> tuple[ShapeSurface, np.ndarray]:
-    """The cavity of a shape around the blade, and the blade's triangles (m, 3, 3).
-
-    Both are in metres and lie below the ceiling.
-    """
+def _made(title: str, keys: dict[str, Any]) -> tuple[ShapeSurface, Part]:
+    """The cavity of a shape around the blade, and the blade in it."""
     from chamberopt import load_design
 
     data = load_design(IMAGES.parents[1] / "designs" / "blade_oblong.toml").model_dump()
@@ -79,48 +88,22 @@ def _made(title: str, keys: dict[str, Any]) -> tuple[ShapeSurface, np.ndarray]:
     data["chamber"] = {"shape": name, "sonotrode_distance_mm": 15, **keys}
     design = Design.model_validate(data)
     part = build_chamber(design).part
-    return design.chamber.surface(part.vertices, part.triangles), part.vertices[part.triangles]
+    return design.chamber.surface(part.vertices, part.triangles), part
 
 
-def _draw(axes: Any, cavity: ShapeSurface, part: np.ndarray) -> None:
-    from matplotlib.colors import to_rgb, to_rgba
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
-
-    corners = 1e3 * cavity.vertices[cavity.triangles]
-    floor = cavity.tags == TAG_SONOTRODE
-    top = corners[..., 2].max()
-    part = 1e3 * part[(1e3 * part[..., 2] < top).any(axis=1)]
-    part[..., 2] = np.minimum(part[..., 2], top)
-    grey = np.array(to_rgb(PART_GREY)) * (0.75 + 0.25 * _unit(part) @ LIGHT)[:, None]
-    face = np.tile(to_rgb(SONOTRODE), (int(floor.sum()), 1))
-    for triangles, colours in ((corners[floor], face), (part, grey)):
-        axes.add_collection3d(
-            Poly3DCollection(triangles, facecolors=colours, edgecolors=colours, linewidths=0.3)
-        )
-    axes.add_collection3d(Poly3DCollection(corners[~floor], facecolors=to_rgba(GLASS, 0.25)))
-    axes.add_collection3d(Line3DCollection(_edges(cavity), colors=EDGES, linewidths=0.6, alpha=0.8))
-    axes.set(xlim=(-23, 23), ylim=(-23, 23), zlim=(4, 53))
-    axes.set_aspect("equal")
-    axes.view_init(elev=20, azim=-58)
-    axes.set_axis_off()
-
-
-def _edges(cavity: ShapeSurface) -> np.ndarray:
-    """Sides (k, 2, 3) mm between triangles that face in different directions."""
-    normal = _unit(cavity.vertices[cavity.triangles])
-    sides: dict[tuple[int, int], list[int]] = {}
-    for number, row in enumerate(cavity.triangles.tolist()):
-        for a, b in zip(row, [*row[1:], row[0]], strict=True):
-            sides.setdefault((min(a, b), max(a, b)), []).append(number)
-    sharp = [
-        side for side, (i, j) in sides.items() if normal[i] @ normal[j] < np.cos(np.radians(10.0))
-    ]
-    return 1e3 * cavity.vertices[np.array(sharp)]
-
-
-def _unit(triangles: np.ndarray) -> np.ndarray:
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-30)[:, None]
+def _add(cavity: ShapeSurface, part: Part, plotter: Any) -> None:
+    """Add a cavity and the part, up to the ceiling, to a plotter."""
+    room = pyvista().PolyData.from_regular_faces(1e3 * cavity.vertices, cavity.triangles)
+    own = pyvista().PolyData.from_regular_faces(1e3 * part.vertices, part.triangles)
+    on_floor = cavity.tags == TAG_SONOTRODE
+    floor, walls = (room.extract_cells(np.flatnonzero(one)) for one in (on_floor, ~on_floor))
+    own = own.clip_closed_surface("-z", origin=(0, 0, room.bounds[5]))
+    plotter.add_mesh(own, color=PART_GREY, ambient=0.5, diffuse=0.5)
+    plotter.add_mesh(floor, color=SONOTRODE, ambient=0.75, diffuse=0.25)
+    plotter.add_mesh(walls, color=GLASS, opacity=0.35, ambient=0.8, diffuse=0.2, culling="front")
+    edges = room.extract_feature_edges(10.0, boundary_edges=False, non_manifold_edges=False)
+    if edges.n_cells:
+        plotter.add_mesh(edges, color=EDGES, line_width=2)
 
 
 if __name__ == "__main__":
