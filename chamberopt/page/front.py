@@ -106,7 +106,7 @@ class Front:
             "designs": [name for name, kind in tables if kind == "design"],
             "shops": [name for name, kind in tables if kind == "shop"],
             "calibrations": [name for name, kind in tables if kind == "calibration"],
-            "alloys": [one.name for one in alloys()],
+            "alloys": [(one.name, one.metal) for one in alloys()],
             "balls": [one.name for one in balls()],
             "shapes": choices(SHAPES),
         }

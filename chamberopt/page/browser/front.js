@@ -16,10 +16,12 @@ async function show(part) {
   find("here").hidden = !here.parts.length;
   find("example").hidden = here.parts.length > 0;
   find("part").value = part ?? here.first;
-  for (const [id, names] of [["material", here.alloys], ["shot", here.balls], ["shape", here.shapes], ["shop", here.shops],
-    ["calibration", here.calibrations]]) {
+  const metals = [...new Set(here.alloys.map(([, metal]) => metal))].map((metal) => element("optgroup", { label: metal },
+    ...here.alloys.filter((one) => one[1] === metal).map(([name]) => option(name))));
+  for (const [id, items] of [["material", metals], ["shot", here.balls.map(option)], ["shape", here.shapes.map(option)],
+    ["shop", here.shops.map(option)], ["calibration", here.calibrations.map(option)]]) {
     const chosen = find(id).value; // stays, as a proposal for it may be shown below
-    find(id).replaceChildren(find(id).options[0], ...names.map(option));
+    find(id).replaceChildren(find(id).options[0], ...items);
     find(id).value = chosen;
   }
   find("of-shop").hidden = !here.shops.length;
@@ -66,9 +68,9 @@ function lookAt({ low, high }, way = [0.49, -0.79, 0.35]) {
   view.look({ middle, eye: middle.map((x, i) => x + 2 * size * way[i]), size });
 }
 
-// Put the part into the chamber that is proposed, as far as it is known, in the place of the picture until there is one.
-async function drawChamber(hasPicture) {
-  (hasPicture ? find("of-choices") : find("place-of-draft")).prepend(find("seen"));
+// Put the part into the chamber that is proposed, as far as it is known.
+async function drawChamber(isDraft) {
+  find("place-of-chamber").append(find("seen"));
   const answer = unpack(await ask("/chamber", {}));
   if (!seen || answer.state.length !== seen.triangles.length / 3) return; // of another part
   view.pose("part", answer.rotation, answer.shift);
@@ -79,7 +81,7 @@ async function drawChamber(hasPicture) {
   const [low, high] = answer.shape_mm;
   const box = { low: low.map((x, i) => Math.min(x, answer.part_mm[0][i])), high: high.map((x, i) => Math.max(x, answer.part_mm[1][i])) };
   lookAt(box, wayToTarget(view.get("part"), answer));
-  document.body.dataset.chamber = hasPicture ? "picture" : "draft";
+  document.body.dataset.chamber = isDraft ? "draft" : "proposal";
 }
 view.renderer.domElement.addEventListener("dblclick", () => { if (view.home) view.look(view.home); });
 const shows = (named, name) => lights(named, view, () => ask("/face", { part: known.part, unit: known.unit, name }), () => pointed);
@@ -138,7 +140,6 @@ find("file").addEventListener("change", () => attempt(() => bring(find("file").f
 find("part").addEventListener("change", () => attempt(() => look(find("part").value)));
 
 // Show the command that proposes a chamber: how far it is, and in the end what it proposes.
-let awaited = false; // whether there is no picture yet
 let drawn = 0, told = ""; // when the picture that is shown was drawn; the proposal that is shown
 function tell({ steps, seconds, lines, warnings, fault, exit, picture, result, proposal }) {
   find("made").hidden = false;
@@ -150,17 +151,16 @@ function tell({ steps, seconds, lines, warnings, fault, exit, picture, result, p
   find("printed-fold").hidden = exit === null || !lines.length;
   find("error").hidden = !exit;
   find("error").replaceChildren(...fault.flatMap((words) => [...onPage(words), "\n"]));
-  find("picture").hidden = !picture;
+  find("picture-fold").hidden = !picture;
   if (picture && picture[1] !== drawn) {
     find("picture").href = `/files/${picture[0].split("/").map(encodeURIComponent).join("/")}?${drawn = picture[1]}`;
     find("picture").firstElementChild.src = find("picture").href;
   }
   find("proposal").hidden = !proposal;
-  find("rows").hidden = !proposal;
+  find("rows-fold").hidden = !proposal;
   find("another").hidden = !proposal || !known.part;
   const isDraft = exit === null, now = JSON.stringify([proposal, result, isDraft]);
-  if (proposal && drawnPart && (now !== told || !picture !== awaited)) attempt(() => drawChamber(Boolean(picture)));
-  awaited = !picture;
+  if (proposal && drawnPart && now !== told) attempt(() => drawChamber(isDraft));
   find("draft").hidden = !isDraft;
   find("made-end").hidden = isDraft;
   if (!proposal || now === told) return; // its buttons stay while one is pointed at

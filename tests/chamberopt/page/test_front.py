@@ -48,7 +48,7 @@ def test_a_part_becomes_a_design_that_opens(front: Served, tmp_path: Path) -> No
     assert here["calibrations"] == ["machine.toml"]
     assert here["parts"] == ["box.stl", "part.STL"]
     assert here["designs"] == ["design.toml"]
-    assert "42CrMo4" in here["alloys"]
+    assert ["42CrMo4", "steel"] in here["alloys"]
     known = {"part": "part.STL", "unit": ""}
     sizes = front.ask("/look", known)["sizes"]
     assert sizes["mm"] == "30 x 20 x 10 mm"

@@ -18,6 +18,8 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
         with chromium() as browser:
             opened = Page(browser, served)
             page = opened.page
+            titanium = page.locator("#material optgroup[label=titanium] option")
+            assert "Ti-6Al-4V" in titanium.all_text_contents()
             page.set_input_files("#file", dropped)
             opened.wait("data-known=sizes")  # an STL states no unit
             assert page.locator("#propose").is_disabled()
@@ -25,6 +27,9 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             page.click("#sizes button >> text=in mm)")
             opened.wait("data-known=all")
             expect(page.locator("#known")).to_contain_text("my part.stl measures 16 x 16 x 16 mm")
+            box = page.locator("#propose").bounding_box()
+            assert box["y"] + box["height"] < 800  # all that is needed is on the first screen
+            page.click("#more summary")
             page.uncheck("#pilot")
             page.fill("#coverage", "50")
             page.click("#propose")
@@ -32,17 +37,18 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             expect(wrong).to_have_text("coverage: given 50; allowed: from 100 to 1000 %")
             assert page.locator("#made").is_hidden()
             page.fill("#coverage", "200")
-            page.click("#more summary")
             page.fill("#ball-mm", "1,2")
             page.click("#propose")
             opened.wait('data-ended="0"')
             expect(page.locator("#sentence")).to_contain_text("Peen face 1 (")
             assert page.locator("#picture img").evaluate("one => one.naturalWidth") > 0
-            opened.wait("data-chamber=picture")  # it is seen in 3D too
+            opened.wait("data-chamber=proposal")  # it is seen in 3D too
             kinds = {"target", "sonotrode", "chamber wall"}
             assert set(page.locator("#legend li").all_text_contents()) >= kinds
+            page.click("#rows-fold summary")
             shown = page.locator("#rows tr", has_text="Balls")
             expect(shown).to_contain_text("1.2 mm")
+            page.click("#another summary")
             expect(page.locator("#choices button[aria-pressed=true]")).to_contain_text("face 1")
             side = page.locator("#choices button", has_text="face 1").first
             before = page.locator("#view").screenshot()
