@@ -121,7 +121,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         "zones": zones,
         "surface": _packed(triangles[:0] if surface is None else surface[triangles], "<i4"),
         "names": () if surface is None else arrays.chamber.part.names,
-        "surfaces": _surfaces(part, rest, chamber, on_deflector, eye)
+        "surfaces": _surfaces(part, rest, chamber, on_deflector)
         | {
             name: _shape(MM * one.vertices, one.triangles) | {"kind": name}
             for name, one in arrays.chamber.fixtures.items()
@@ -144,21 +144,16 @@ def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
 
 
 def _surfaces(
-    part: DrawnPart,
-    rest: Surface | None,
-    chamber: Surface,
-    on_deflector: np.ndarray,
-    eye: np.ndarray,
+    part: DrawnPart, rest: Surface | None, chamber: Surface, on_deflector: np.ndarray
 ) -> dict[str, dict[str, object]]:
     """Return the surfaces that view3d.js draws, by name, but for holder and mask.
 
     The names are part (the target with enough dents), few (the target with too few dents),
     unreached (the target that no ball can touch), rest (the rest of the part), sonotrode,
-    deflectors, and walls. The colour of each is that of its kind, but for part.
+    deflectors, and walls. Colour and opacity of each are those of its kind, but for part.
 
     Args:
         on_deflector: which triangles of the cavity are of a deflector, (k,).
-        eye: direction to the camera.
     """
     tags = np.asarray(chamber["tag"])
     walls = (tags == TAG_WALL) & ~np.any([tags < 0, *fixture_marks(chamber).values()], axis=0)
@@ -169,21 +164,20 @@ def _surfaces(
         # These surfaces share the points of the part, which the page carries once.
         "few": {"triangles": _packed(corners[~resolved], "<i4"), "kind": "few"},
     }
-    around: dict[str, tuple[np.ndarray, str, float]] = {
-        "sonotrode": (is_sonotrode(tags), "sonotrode", 0.9 if eye[2] > 0.0 else 0.08),
-        "deflectors": (walls & on_deflector, "wall", 0.13),
-        "walls": (walls & ~on_deflector, "wall", 0.13),
+    around = {
+        "sonotrode": (is_sonotrode(tags), "sonotrode"),
+        "deflectors": (walls & on_deflector, "wall"),
+        "walls": (walls & ~on_deflector, "wall"),
     }
-    others = [("unreached", part.unreached, "unreached", 1.0), ("rest", rest, "rest", 1.0)]
+    others = [("unreached", part.unreached, "unreached"), ("rest", rest, "rest")]
     others += [
-        (name, chamber.extract_cells(here).extract_surface(algorithm="dataset_surface"), *look)
-        for name, (here, *look) in around.items()
+        (name, chamber.extract_cells(here).extract_surface(algorithm="dataset_surface"), kind)
+        for name, (here, kind) in around.items()
         if here.any()
     ]
-    for name, surface, kind, opacity in others:
+    for name, surface, kind in others:
         if surface is not None and surface.n_cells:
-            shape = _shape(surface.points, surface.regular_faces)
-            found[name] = {**shape, "kind": kind, "opacity": opacity}
+            found[name] = _shape(surface.points, surface.regular_faces) | {"kind": kind}
     return found
 
 

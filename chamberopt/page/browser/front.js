@@ -75,8 +75,8 @@ async function drawChamber(isDraft) {
   if (!seen || answer.state.length !== seen.triangles.length / 3) return; // of another part
   view.pose("part", answer.rotation, answer.shift);
   colourByState(view, "part", seen, answer.state);
-  view.surface("walls", { points: answer.points, triangles: answer.walls, kind: "wall", opacity: 0.16 });
-  view.surface("sonotrode", { points: answer.points.slice(), triangles: answer.sonotrode, kind: "sonotrode", opacity: 0.9 });
+  view.surface("walls", { points: answer.points, triangles: answer.walls, kind: "wall" });
+  view.surface("sonotrode", { points: answer.points.slice(), triangles: answer.sonotrode, kind: "sonotrode" });
   view.lines("edges", answer.edges, seen.edges, "wall");
   const [low, high] = answer.shape_mm;
   const box = { low: low.map((x, i) => Math.min(x, answer.part_mm[0][i])), high: high.map((x, i) => Math.max(x, answer.part_mm[1][i])) };

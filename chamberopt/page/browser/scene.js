@@ -2,7 +2,6 @@
 import { change, endMove, unpack, value } from "./state.js";
 import { colourByState, wayToTarget } from "./surfaces.js";
 
-const CLEAR = 0.16, FACE = 0.9; // opacity of walls and sonotrode
 const BODIES = ["deflectors", "holder", "mask"]; // that not every chamber has
 export const view = new View3D(document.getElementById("view"));
 const tools = new Tools([view], document.getElementById("tools"));
@@ -52,23 +51,16 @@ function colour(name, state) {
 }
 
 function walls(answer) {
-  const surface = (name, kind, opacity, triangles, points = answer.points) => {
+  const surface = (name, kind, triangles, points = answer.points, opacity = undefined) => {
     if (triangles?.length) view.surface(name, { points: points.slice(), triangles: triangles.slice(), kind, opacity });
   };
-  surface("walls", "wall", CLEAR, answer.walls);
-  surface("deflectors", "wall", CLEAR, answer.deflectors);
-  surface("sonotrode", "sonotrode", opacityOfSonotrode(), answer.sonotrode);
+  surface("walls", "wall", answer.walls);
+  surface("deflectors", "wall", answer.deflectors);
+  surface("sonotrode", "sonotrode", answer.sonotrode);
   bodies = answer;
-  for (const name of ["holder", "mask"]) surface(name, name, through ? 0.35 : 1, answer[`${name}_triangles`], answer[`${name}_points`]);
+  for (const name of ["holder", "mask"]) surface(name, name, answer[`${name}_triangles`], answer[`${name}_points`], through ? 0.35 : 1);
   view.lines("edges", answer.edges.slice(), part.edges, "wall");
 }
-
-// From below the part is seen through it.
-const opacityOfSonotrode = () => view.camera.position.z < 0 ? 0.15 : FACE;
-view.orbit.addEventListener("change", () => {
-  const sonotrode = view.get("sonotrode");
-  if (sonotrode) sonotrode.material.opacity = opacityOfSonotrode();
-});
 
 // Holder and mask are seen through while their faces are chosen.
 export function seeThrough(now) {
@@ -95,35 +87,23 @@ function lookAtAll() {
 
 view.renderer.domElement.addEventListener("dblclick", () => { if (placed) lookAtAll(); });
 
-// Sizes of the chamber and the part's height over the sonotrode, the part's box, and the axes of the part's file.
+// Sizes of the chamber and the part's height over the sonotrode, and the part's box.
 function dimensions() {
   const [low, high] = placed.shape_mm, [a, b] = placed.part_mm, size = Math.hypot(...high.map((x, i) => x - low[i]));
-  const gap = 0.06 * size;
-  const chamber = [
-    ...dimension([low[0], low[1], 0], [high[0], low[1], 0], [0, -gap, 0], size),
-    ...dimension([high[0], high[1], 0], [high[0], high[1], high[2]], [gap, 0, 0], size),
-    ...dimension([b[0], a[1], 0], [b[0], a[1], a[2]], [0, 0, 0], size),
-  ];
+  const gap = 0.06 * size, upright = [0, 0, 1];
   const ends = [];
   for (const [i, j] of [[0, 1], [1, 3], [3, 2], [2, 0], [4, 5], [5, 7], [7, 6], [6, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
     for (const k of [i, j]) ends.push([k & 1 ? b[0] : a[0], k & 2 ? b[1] : a[1], k & 4 ? b[2] : a[2]]);
-  const o = placed.shift, r = placed.rotation, long = 0.15 * size, axes = [];
-  for (const k of [0, 1, 2]) {
-    const tip = o.map((x, i) => x + long * r[3 * i + k]);
-    ends.push(o, tip);
-    axes.push([`file ${"xyz"[k]}`, tip]);
-  }
-  view.lines("dimensions", Float32Array.from(ends.flat()), "#56616a");
-  view.lines("dimensions of the chamber", Float32Array.from(chamber.flat()), "#56616a", "wall");
-  view.texts("sizes of the chamber", [
-    [`${short(high[0] - low[0])} mm`, [0.5 * (low[0] + high[0]), low[1] - gap, -0.4 * gap]],
-    [`${short(high[2])} mm`, [high[0] + gap, high[1], 0.8 * high[2]]],
-    [`${short(a[2])} mm`, [b[0], a[1], 0.5 * a[2]]],
-  ], "wall");
-  view.texts("sizes", [
-    [b.map((x, i) => short(x - a[i])).join(" × ") + " mm", [0.5 * (a[0] + b[0]), a[1], b[2] + 0.03 * size]],
-    ...axes,
-  ]);
+  const show = (name, along, lines, texts) => {
+    view.lines(`${name}, lines`, Float32Array.from(lines.flat()), "#56616a", along ? "wall" : "", along);
+    view.texts(name, texts, along ? "wall" : "", along);
+  };
+  show("box", null, ends, [[b.map((x, i) => short(x - a[i])).join(" × ") + " mm", [0.5 * (a[0] + b[0]), a[1], b[2] + 0.03 * size]]]);
+  show("width", [1, 0, 0], dimension([low[0], low[1], 0], [high[0], low[1], 0], [0, -gap, 0], size),
+    [[`${short(high[0] - low[0])} mm`, [0.5 * (low[0] + high[0]), low[1] - gap, -0.4 * gap]]]);
+  show("height", upright, [...dimension([high[0], high[1], 0], [high[0], high[1], high[2]], [gap, 0, 0], size),
+    ...dimension([b[0], a[1], 0], [b[0], a[1], a[2]], [0, 0, 0], size)],
+  [[`${short(high[2])} mm`, [high[0] + gap, high[1], 0.8 * high[2]]], [`${short(a[2])} mm`, [b[0], a[1], 0.5 * a[2]]]]);
 }
 
 // Ends of the lines of a dimension between two places: arrows, aside by a way, and a line from each place to its arrow.

@@ -180,13 +180,22 @@ def test_a_switch_hides_the_chamber_as_its_legend_does(opened: Page) -> None:
     assert page.evaluate(SEEN)[:2] == [True, True]
 
 
-def test_the_sonotrode_is_seen_through_from_below_only(opened: Page) -> None:
-    sonotrode = (
-        """async () => (await import("/browser/scene.js")).view.get("sonotrode").material.opacity"""
-    )
-    for side, opacity in (("Bottom", 0.15), ("Isometric", 0.9)):
-        opened.page.get_by_role("button", name=side).click()
-        assert opened.page.evaluate(sonotrode) == opacity
+# Opacity of the sonotrode, and the texts that are to be seen in the view, after its next frame.
+LOOKED = """async () => {
+  await new Promise(requestAnimationFrame);
+  const { view } = await import("/browser/scene.js");
+  const texts = view.all().filter(([, one]) => one.userData.isText).flatMap(([, one]) => one.children);
+  return [view.get("sonotrode").material.opacity, texts.filter((one) => one.layers.mask === 1).length];
+}"""
+
+
+@pytest.mark.parametrize(
+    ("side", "opacity", "texts"), [("Bottom", 0.15, 2), ("Left", 0.9, 3), ("Isometric", 0.9, 4)]
+)
+def test_what_is_seen_from_a_side(opened: Page, side: str, opacity: float, texts: int) -> None:
+    """From below the part through the sonotrode; no dimension along the line of sight."""
+    opened.page.get_by_role("button", name=side, exact=True).click()
+    assert opened.page.evaluate(LOOKED) == [opacity, texts]
 
 
 def test_the_face_under_the_pointer_lights_up(opened: Page) -> None:

@@ -2,6 +2,9 @@
 "use strict";
 THREE.ColorManagement.enabled = false; // a colour on the screen is the one of the colour bar
 const TEXT_HEIGHT = 0.0115; // over its distance: 2.2 % of the view's height
+const OPACITY = { wall: 0.16, sonotrode: 0.9 }; // of the kinds that are seen through
+const FROM_BELOW = 0.15; // opacity of the sonotrode before the part
+const END_ON = 0.97; // cosine between sight and a dimension from which on it is not drawn
 class View3D {
   #meshes = new Map();
   #waiting = false;
@@ -72,7 +75,7 @@ class View3D {
   // Replace a surface. triangles: three numbers of points each; colours: of each triangle, as [r, g, b] in 0..1 one after
   // the other. Where `scale` is set, values between 0 and 1 at the points are its colours (see `paint`).
   // Else its kind gives its colour. A section does not fill the body of an open surface.
-  surface(name, { points, triangles, kind = "", opacity = 1, scale = false, open = false }) {
+  surface(name, { points, triangles, kind = "", opacity = OPACITY[kind] ?? 1, scale = false, open = false }) {
     const colour = this.kinds[kind]?.[1] ?? "#ffffff";
     this.remove(name);
     const geometry = new THREE.BufferGeometry();
@@ -119,23 +122,27 @@ class View3D {
     this.draw();
   }
 
-  // Replace lines: ends of one after the other, [x, y, z, x, y, z, ...]. They are hidden with a kind of surfaces.
-  lines(name, ends, colour, kind = "") {
+  // Replace lines: ends of one after the other, [x, y, z, x, y, z, ...]. They are hidden with a kind of surfaces, and where
+  // the eye looks along a unit vector [x, y, z].
+  lines(name, ends, colour, kind = "", along = null) {
     this.remove(name);
     const geometry = new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(ends, 3));
-    return this.#keep(name, this.#along(kind, new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour }))));
+    return this.#keep(name, this.#along(kind, new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour })), along));
   }
 
-  // Replace texts: [text, [x, y, z]] each. They are as large near as far, and are hidden with a kind of surfaces.
-  texts(name, texts, kind = "") {
+  // Replace texts: [text, [x, y, z]] each. They are as large near as far, and are hidden as lines are, and where they would
+  // overlap others.
+  texts(name, texts, kind = "", along = null) {
     this.remove(name);
     const group = new THREE.Object3D();
     for (const [text, at] of texts) group.add(View3D.textOf(text, at, TEXT_HEIGHT, undefined, true));
-    return this.#keep(name, this.#along(kind, group));
+    for (const one of group.children) one.renderOrder = 80; // in front of what is seen through
+    group.userData.isText = true;
+    return this.#keep(name, this.#along(kind, group, along));
   }
 
-  #along(kind, mesh) {
-    mesh.userData.kind = kind;
+  #along(kind, mesh, along = null) {
+    Object.assign(mesh.userData, { kind, along });
     mesh.visible = !this.#hidden.has(kind);
     return mesh;
   }
@@ -320,6 +327,7 @@ class View3D {
     if (!this.renderer.domElement.isConnected) return;
     this.section.refresh();
     this.#tellKinds();
+    this.#show();
     const { renderer, camera } = this, { clientWidth: width, clientHeight: height } = this.element, corner = 84;
     renderer.setViewport(0, 0, width, height);
     renderer.clear();
@@ -329,6 +337,26 @@ class View3D {
     this.triadCamera.position.copy(camera.position).sub(this.orbit.target).setLength(7);
     this.triadCamera.lookAt(0, 0, 0);
     renderer.render(this.triad, this.triadCamera);
+  }
+
+  // Show what the eye can make out: the part through the sonotrode, dimensions from aside, and of texts that overlap the first.
+  #show() {
+    const sight = this.camera.getWorldDirection(new THREE.Vector3()), taken = [], all = this.all().map(([, mesh]) => mesh);
+    const sonotrode = this.get("sonotrode");
+    if (sonotrode) sonotrode.material.opacity = this.camera.position.z < 0 ? FROM_BELOW : OPACITY.sonotrode;
+    for (const mesh of all) {
+      const { along } = mesh.userData, isEndOn = along && Math.abs(sight.dot(new THREE.Vector3(...along))) > END_ON;
+      mesh.traverse((one) => { one.layers.set(isEndOn ? 1 : 0); }); // the camera sees the layer 0
+    }
+    const height = TEXT_HEIGHT * this.element.clientHeight / (2 * Math.tan(this.camera.fov * Math.PI / 360));
+    const texts = all.filter(({ userData, visible }) => userData.isText && visible).flatMap(({ children }) => children);
+    for (const one of texts.sort((a, b) => b.renderOrder - a.renderOrder)) {
+      const width = height * one.scale.x / one.scale.y, [x, y] = this.onScreen(one.position);
+      const left = x - one.center.x * width, top = y - (1 - one.center.y) * height;
+      const isOver = taken.some(([l, t, w]) => left < l + w && l < left + width && top < t + height && t < top + height);
+      if (isOver) one.layers.set(1);
+      else if (one.layers.mask === 1) taken.push([left, top, width]);
+    }
   }
 
   #tellKinds() {
