@@ -42,6 +42,7 @@ from chamberopt.page.structure import (
 Changes = Mapping[str, Any]
 LONGEST_SAVE_S = 5.0  # wait for another page's save, which takes a tenth of a second
 LATE_WRITE_S = 0.05  # an editor takes far less from opening a file to writing it
+FACETS, ACCURACY = "chamber.facets", "process.accuracy"  # a number and the table that it is shown in
 TO_SETTLE = "to_settle"  # from which the page takes out what is settled
 # Keys that the page changes beside its fields: zones, and the faces of target, zone or fixture.
 PICKED = re.compile(
@@ -305,6 +306,8 @@ NOT_SHOWN = (
 def design_fields(file: EditedFile) -> list[dict[str, object]]:
     """Return what the page shows of each number and choice in a design, in the order of the file.
 
+    The facets of a round wall come last, as they are a number of the accuracy.
+
     Each row has the name, also in words, value, unit, allowed range and explanation, and the reason
     that the file has behind it.
     """
@@ -335,7 +338,7 @@ def design_fields(file: EditedFile) -> list[dict[str, object]]:
         row
         | _words(design, row["name"])
         | {"reason": on_page(_new(row["reason"], row["text"])), "text": on_page(row["text"])}
-        for row in [*_structure_rows(file), *rows]
+        for row in [*_structure_rows(file), *sorted(rows, key=lambda row: row["name"] == FACETS)]
     ]
 
 
@@ -350,6 +353,7 @@ def _words(design: Design, name: str) -> dict[str, str]:
     steps = name.split(".")
     depth = 2 if name.startswith(("process.accuracy.", "steps.")) else 1
     table, key = ".".join(steps[:depth]), ".".join(steps[depth:])
+    table = ACCURACY if name == FACETS else table
     group = inner_first(table)
     if steps[0] == "steps":
         group = f"step {(design.steps or ())[int(steps[1])].name}"

@@ -123,6 +123,7 @@ def test_every_number_has_its_bounds_unit_and_description(file: EditedFile) -> N
     ]
     assert rows["part.offset_mm.0"]["in_full"] == "Part offset, x [mm]"
     assert rows["process.accuracy.replicas"]["group"] == "Accuracy of the process"
+    assert rows["chamber.facets"]["group"] == "Accuracy of the process"
     for name in file.design.numbers():
         tables = ("effects.part_turn", "sonotrode.amplitude_profile", "sonotrode.blocks")
         absent = name.startswith(tables) and name[-1].isdecimal()
