@@ -25,7 +25,7 @@ POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data: blob:; worker-src blob:; font-src data:; base-uri 'none'; form-action 'none'"
 )
-VIEW = "view/view3d.js", "view/section.js", "view/measure.js", "view/tools.js"
+VIEW = "view/view3d.js", "view/section.js", "view/round.js", "view/measure.js", "view/tools.js"
 SCRIPTS = "three/three.min.js", *VIEW, "part.js"
 HELP = (
     "Drag to turn, use the wheel to zoom, point at the target to see its numbers there; a click "

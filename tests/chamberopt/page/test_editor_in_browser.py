@@ -144,6 +144,32 @@ def test_two_clicks_measure(opened: Page) -> None:
     assert page.evaluate(two, [[0, 0, 1], [0, 0, 1]]) == ["5 mm (x 3, y 4, z 0)"]
 
 
+def test_a_click_measures_what_is_round(opened: Page) -> None:
+    """A wall of 40 mm and 64 sides, the disc that it stands on, a tube's bore, and its flat rim."""
+    of = """async (clicks) => {
+      const { view } = await import("/browser/scene.js");
+      const points = [], index = [], sides = 24, ring = [[5, 0], [9, 0], [9, 20], [5, 20]];
+      for (let k = 0; k < sides; k++) ring.forEach(([radius, y], i) => {
+        const turn = 2 * Math.PI * k / sides, far = (k + 1) % sides, other = (i + 1) % 4;
+        points.push(radius * Math.cos(turn), y, radius * Math.sin(turn));
+        index.push(4 * k + i, 4 * k + other, 4 * far + other, 4 * k + i, 4 * far + other, 4 * far + i);
+      });
+      const mesh = new THREE.Mesh();
+      Object.assign(mesh.userData, { points, index });
+      return clicks.map(([name, place]) => {
+        const one = name === "tube" ? mesh : view.get(name), own = one.userData, near = new THREE.Vector3(...place);
+        const middle = (k) => [0, 1, 2].reduce((sum, i) => sum.add(Round.corner(one, own.index[3 * k + i])), new THREE.Vector3()).divideScalar(3);
+        let best = 0;
+        for (let k = 1; k < own.index.length / 3; k++) if (middle(k).distanceTo(near) < middle(best).distanceTo(near)) best = k;
+        return Round.of(one, best, near)?.diameter ?? 0;
+      });
+    }"""
+    clicks = [["walls", [0, 20, 18]], ["sonotrode", [0, 15, 0]], ["part", [8, 0, 20]]]
+    clicks += [["tube", [0, 10, 5]], ["tube", [0, 10, -9]], ["tube", [8.5, 20, 0]]]
+    found = opened.page.evaluate(of, clicks)
+    assert found == pytest.approx([40, 40, 0, 10, 18, 18], rel=1e-3)
+
+
 def test_the_legend_hides_a_kind_and_the_view_turns_to_an_axis(opened: Page) -> None:
     page, wall = opened.page, opened.page.locator("#legend").get_by_role("button", name="wall")
     way = [0.0, 0.0, 0.0]

@@ -1,4 +1,5 @@
-// Measuring between two clicks in views: the distance with its parts, and how the faces clicked stand to each other.
+// Measuring by clicks in views: the diameter of what is round, the distance of two clicks with its parts, and how the
+// faces clicked stand to each other.
 "use strict";
 class Measure {
   static NEAR = 9; // pixels from a corner or edge at which a click is moved onto it
@@ -12,7 +13,7 @@ class Measure {
 
   start() {
     for (const view of this.views) view.tool = (event) => this.#click(view, event);
-    this.tell("click two points; Escape ends it");
+    this.tell("click two points for their distance, or a round surface for its diameter; Escape ends it");
   }
 
   end() {
@@ -29,14 +30,16 @@ class Measure {
     if (!hit) { this.tell("nothing is there: click a surface"); return; }
     const first = this.#first?.view === view ? this.#first : null;
     this.#first = first ? null : { view, ...hit };
-    const lines = first ? Measure.words(first, hit) : [];
-    this.#show(view, first ? [first.place, hit.place] : [hit.place], lines);
-    this.tell(first ? lines.join("; ") : `from ${Measure.at(hit.place)}: click the other point`);
+    const met = Measure.#met(view, event), round = met?.name ? Round.of(view.get(met.name), met.triangle, met.place) : null;
+    const across = round ? [`⌀ ${Measure.number(round.diameter)} mm`] : [], lines = first ? [...Measure.words(first, hit), ...across] : across;
+    this.#show(view, first ? [first.place, hit.place] : [hit.place], lines, round);
+    this.tell(first ? lines.join("; ") : [...across, `from ${Measure.at(hit.place)}: click the other point`].join("; "));
   }
 
-  #show(view, places, words) {
-    const arm = 0.008 * view.home.size, ends = places.flatMap((one) => one.toArray());
+  #show(view, places, words, round) {
+    const arm = 0.008 * view.home.size, ends = places.flatMap((one) => one.toArray()), parts = round ? 96 : 0;
     if (places.length < 2) ends.length = 0;
+    for (let k = 0; k < parts; k++) for (const one of [k, k + 1]) ends.push(...round.at(one * 2 * Math.PI / parts).toArray());
     for (const one of places) for (const axis of ["x", "y", "z"])
       for (const way of [-arm, arm]) { const tip = one.clone(); tip[axis] += way; ends.push(...tip); }
     const lines = view.lines("measured", Float32Array.from(ends), "#d6006c");
@@ -110,22 +113,12 @@ class Measure {
 
   // Ends of a surface's sharp edges and of its border, found once.
   static sharp(mesh) {
-    const { index, points } = mesh.userData;
     if (mesh.userData.sharp) return mesh.userData.sharp;
-    const corner = (i) => new THREE.Vector3().fromArray(points, 3 * i), sides = new Map();
-    const normals = [], found = [], most = points.length / 3;
-    for (let k = 0; k < index.length; k += 3) {
-      const a = corner(index[k]);
-      normals.push(corner(index[k + 1]).sub(a).cross(corner(index[k + 2]).sub(a)).normalize());
-      for (let c = 0; c < 3; c++) {
-        const [i, j] = [index[k + c], index[k + (c + 1) % 3]], key = Math.min(i, j) * most + Math.max(i, j);
-        const other = sides.get(key);
-        sides.delete(key);
-        if (other === undefined) sides.set(key, k / 3);
-        else if (normals[other].dot(normals[k / 3]) < Measure.SHARP) found.push(i, j);
-      }
+    const { index } = mesh.userData, { normals, beside } = Round.facets(mesh), found = [];
+    for (let k = 0; k < index.length; k += 3) for (let c = 0; c < 3; c++) {
+      const other = beside[k + c];
+      if (other < 0 || (other < k / 3 && normals[other].dot(normals[k / 3]) < Measure.SHARP)) found.push(index[k + c], index[k + (c + 1) % 3]);
     }
-    for (const key of sides.keys()) found.push(Math.floor(key / most), key % most);
-    return mesh.userData.sharp = Float32Array.from(found.flatMap((i) => corner(i).toArray()));
+    return mesh.userData.sharp = Float32Array.from(found.flatMap((i) => Round.corner(mesh, i).toArray()));
   }
 }

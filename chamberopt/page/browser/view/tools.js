@@ -19,7 +19,7 @@ class Tools {
     };
     this.views = views;
     this.section = make("button", { textContent: "Section", title: "cut the view by a plane" });
-    this.measure = make("button", { textContent: "Measure", title: "distance of two clicks; Escape ends it" });
+    this.measure = make("button", { textContent: "Measure", title: "distance of two clicks, or diameter of what is round; Escape ends it" });
     this.by = make("select", { title: "across which axis, or through which face" },
       ...[["x", "across x"], ["y", "across y"], ["z", "across z"], ["face", "through a face"]].map(([value, textContent]) => make("option", { value, textContent })));
     this.slider = make("input", { type: "range", ariaLabel: "place of the section" });
