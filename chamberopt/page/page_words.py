@@ -51,6 +51,11 @@ COMMANDS = {
     "chamberopt check --pilot": "a check with pilot runs, in a terminal",
     "chamberopt calibrate": "a calibration of the machine, in a terminal",
     "chamberopt materials": "the catalogue of materials",
+    "chamberopt shot": "the catalogue of balls",
+    "chamberopt inspect": "a window in 3D, from a terminal",
+    "chamberopt strip": "a virtual Almen strip, in a terminal",
+    "chamberopt export": "an export, in a terminal",
+    "chamberopt new": "the page of parts",
     "chamberopt shop --example": "the example of a shop's file",
     "simulate it with --tolerances": "simulate it with tolerances, in a terminal",
 }
@@ -85,18 +90,21 @@ _TERM = re.compile(rf"(?<![\w./])(?:{'|'.join(map(re.escape, TERMS))})(?![\w./])
 _FILES = (".toml", ".json", ".html", ".pdf", ".png", *SUFFIXES)  # "part.stl" is no key
 
 
-def on_page(text: str) -> Words:
+def on_page(text: str, known: set[str] | None = None) -> Words:
     """Return a message of the program with its keys and options in the words of the page.
 
     A command is named by what the page has in its place. A term has its meaning where it stands
     first.
+
+    Args:
+        known: terms that have had their meaning before; those of the message are added.
 
     >>> on_page("raise chamber.height_mm")
     ['raise ', ('height of the chamber', 'chamber.height_mm')]
     """
     made: Words = []
     at = 0
-    known: set[str] = set()
+    known = set() if known is None else known
     for match in sorted((*_KEY.finditer(text), *_TERM.finditer(text)), key=lambda one: one.start()):
         found = match[0]
         if match.start() < at or found in known:
@@ -122,16 +130,16 @@ _SAID = re.compile(r"(<(?:p|td|th|dt|dd|li|caption)\b[^>]*>)([^<]+)")
 
 
 def explained(html: str) -> str:
-    """Return HTML in which each term has its meaning as a tip where it stands first."""
+    """Return HTML whose sentences are in the words of the page, as of `on_page`.
+
+    Keys, commands and terms have what they are as a tip, a term where it stands first.
+    """
     known: set[str] = set()
 
-    def with_tip(match: re.Match[str]) -> str:
-        if match[0] in known:
-            return match[0]
-        known.add(match[0])
-        return f'<abbr title="{escape(TERMS[match[0]])}">{match[0]}</abbr>'
+    def told(one: str | tuple[str, str]) -> str:
+        return one if isinstance(one, str) else f'<abbr title="{escape(one[1])}">{one[0]}</abbr>'
 
-    return _SAID.sub(lambda said: said[1] + _TERM.sub(with_tip, said[2]), html)
+    return _SAID.sub(lambda said: said[1] + "".join(map(told, on_page(said[2], known))), html)
 
 
 # How `new` names balls and an amplitude that would serve (chamber/propose), in mm and µm.

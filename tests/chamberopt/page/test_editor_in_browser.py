@@ -152,16 +152,19 @@ def test_a_click_measures_what_is_round(opened: Page) -> None:
       for (let k = 0; k < sides; k++) ring.forEach(([radius, y], i) => {
         const turn = 2 * Math.PI * k / sides, far = (k + 1) % sides, other = (i + 1) % 4;
         points.push(radius * Math.cos(turn), y, radius * Math.sin(turn));
-        index.push(4 * k + i, 4 * k + other, 4 * far + other, 4 * k + i, 4 * far + other, 4 * far + i);
+        const [a, b, c, d] = [4 * k + i, 4 * k + other, 4 * far + other, 4 * far + i];
+        index.push(a, b, c, a, c, d);
       });
       const mesh = new THREE.Mesh();
       Object.assign(mesh.userData, { points, index });
       return clicks.map(([name, place]) => {
-        const one = name === "tube" ? mesh : view.get(name), own = one.userData, near = new THREE.Vector3(...place);
-        const middle = (k) => [0, 1, 2].reduce((sum, i) => sum.add(Round.corner(one, own.index[3 * k + i])), new THREE.Vector3()).divideScalar(3);
-        let best = 0;
-        for (let k = 1; k < own.index.length / 3; k++) if (middle(k).distanceTo(near) < middle(best).distanceTo(near)) best = k;
-        return Round.of(one, best, near)?.diameter ?? 0;
+        const one = name === "tube" ? mesh : view.get(name), { index } = one.userData;
+        const near = new THREE.Vector3(...place), away = [];
+        for (let k = 0; k < index.length; k += 3) {
+          const [a, b, c] = [0, 1, 2].map((i) => Round.corner(one, index[k + i]));
+          away.push(a.add(b).add(c).divideScalar(3).distanceTo(near));
+        }
+        return Round.of(one, away.indexOf(Math.min(...away)), near)?.diameter ?? 0;
       });
     }"""
     clicks = [["walls", [0, 20, 18]], ["sonotrode", [0, 15, 0]], ["part", [8, 0, 20]]]
@@ -210,8 +213,9 @@ def test_a_switch_hides_the_chamber_as_its_legend_does(opened: Page) -> None:
 LOOKED = """async () => {
   await new Promise(requestAnimationFrame);
   const { view } = await import("/browser/scene.js");
-  const texts = view.all().filter(([, one]) => one.userData.isText).flatMap(([, one]) => one.children);
-  return [view.get("sonotrode").material.opacity, texts.filter((one) => one.layers.mask === 1).length];
+  const groups = view.all().map(([, one]) => one).filter((one) => one.userData.isText);
+  const seen = groups.flatMap((one) => one.children).filter((one) => one.layers.mask === 1);
+  return [view.get("sonotrode").material.opacity, seen.length];
 }"""
 
 

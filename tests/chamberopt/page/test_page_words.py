@@ -1,7 +1,12 @@
 """Messages in the words of the page, and what they offer to take."""
 
+import ast
+import re
+from pathlib import Path
+
 import pytest
 
+import chamberopt
 from chamberopt.page.page_words import TERMS, amplitudes_named, balls_named, explained, on_page
 
 
@@ -45,7 +50,29 @@ def test_a_command_is_named_as_the_page_has_it() -> None:
     ]
 
 
+def test_commands_in_html_are_named_as_the_page_has_them() -> None:
+    found = explained("<p>1 &lt; 2: chamberopt calibrate</p><pre>chamberopt calibrate</pre>")
+    tip = '<abbr title="chamberopt calibrate">a calibration of the machine, in a terminal</abbr>'
+    assert found == f"<p>1 &lt; 2: {tip}</p><pre>chamberopt calibrate</pre>"
+
+
 def test_terms_in_html_are_explained_outside_tags_and_drawings() -> None:
     text = '<p class="C0">C0, and C0</p><svg><text>v0</text></svg>'
     tip = f'<abbr title="{TERMS["C0"]}">C0</abbr>'
     assert explained(text) == f'<p class="C0">{tip}, and C0</p><svg><text>v0</text></svg>'
+
+
+def test_no_message_of_the_program_names_a_command_on_the_page() -> None:
+    package = Path(chamberopt.__file__).parent
+    commands = "|".join(one.stem for one in (package / "cli" / "commands").glob("[a-z]*.py"))
+    named = re.compile(rf"chamberopt (?:{commands}|run|shot|shop|materials)\b")
+    for file in package.rglob("*.py"):
+        if file.relative_to(package).parts[0] in ("cli", "page"):
+            continue
+        tree = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        nodes = [one for one in tree if not isinstance(one, ast.Expr)]  # docstrings
+        texts = [kid.value for one in nodes for kid in ast.iter_child_nodes(one)
+                 if isinstance(kid, ast.Constant) and isinstance(kid.value, str)]  # fmt: skip
+        for text in texts:
+            shown = "".join(one if isinstance(one, str) else one[0] for one in on_page(text))
+            assert not named.search(shown), file.name
