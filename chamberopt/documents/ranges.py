@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from chamberopt.common import number_text
+from chamberopt.common.key_words import title_with_unit
 from chamberopt.documents.document import AnswerLine, Block, Section, Sentence, Table
 from chamberopt.documents.wording import Label, metric_label, objective_label, per_cent, plain
 
@@ -25,7 +26,7 @@ MEASURED_BY = {
 }
 TIME = "time_to_98_s"
 HEADLINES = ("mean_coverage", TIME)
-ENDS = {"low": "low", "high": "high"}
+ENDS_HEAD = ("", "at the low end", "at the high end")
 
 
 def range_texts(found: RangeResult | None) -> dict[str, str]:
@@ -115,14 +116,14 @@ def range_section(result: Result) -> Section | None:
     found = result.record.ranges
     if not found:
         return None
-    names = [*found.groups]
     text = (
         f"Intervals say how well the figures are counted. Nobody has measured {_groups(found)}. "
         "A range is that of a figure while each of these lies anywhere in its own. Both ends of "
         f"each were simulated in {found.replicas} replicas, {found.cost:.2g} times the work of the "
         "figures themselves, and the changes were added in quadrature, without what noise adds."
     )
-    rows, ends = [], []
+    rows: list[tuple[str, ...]] = []
+    changes: dict[str, list[tuple[str, ...]]] = {group: [] for group in found.groups}
     for name, figure in found.figures.items():
         if name != result.objective_name and name not in result.metrics:
             continue  # a figure of another version, which this one does not know
@@ -135,19 +136,24 @@ def range_section(result: Result) -> Section | None:
                 _most(figure),
             )
         )
-        changes = [end for one in names for end in _ends(label, figure, one)]
-        ends.append((label.with_unit, *changes))
+        for group, own in changes.items():
+            own.append((label.with_unit, *_ends(label, figure, group)))
     numbers = [
-        (name, *(plain(x, 3) for x in (one.value, one.low, one.high)))
+        (
+            title_with_unit(name.removeprefix("effects.")),
+            *(plain(x, 3) for x in (one.value, one.low, one.high)),
+        )
         for group in found.groups.values()
         for name, one in group.items()
     ]
     head = ("", "± 95 % of counting", "range", "most of it by")
-    sides = [f"{WORDS.get(one, one)}, {end}" for one in names for end in ENDS.values()]
     content: list[Block] = [
         Sentence(text),
         Table("The figures and their ranges", head, rows),
-        Table("Changes at the ends, ± 95 % noise of their runs", ("", *sides), ends),
+        *(
+            Table(f"Changes by {WORDS.get(group, group)}, ± 95 % noise of its runs", ENDS_HEAD, own)
+            for group, own in changes.items()
+        ),
         Table("What is not calibrated", ("", "as designed", "low", "high"), numbers),
     ]
     content += [Sentence(one) for one in _left_out(found)]
