@@ -46,7 +46,7 @@ KEYS = {"holder.at": "faces of the holder", "mask.at": "faces of the mask"}
 COMMANDS = {
     "chamberopt simulate": "Simulate, in the tab Run",
     "simulate --tolerances": "a simulation with tolerances, in a terminal",
-    "chamberopt run": "Run the search, in the tab Run",
+    "chamberopt run": "Search, in the tab Run",
     "chamberopt check": "what this page says at its right",
     "chamberopt check --pilot": "a check with pilot runs, in a terminal",
     "chamberopt calibrate": "a calibration of the machine, in a terminal",

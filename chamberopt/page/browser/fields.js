@@ -86,17 +86,17 @@ function numberRow(field) {
     else change({ [field.name]: now });
   });
   for (const end of [low, high]) end.addEventListener("change", newEnds);
-  const more = element("div", { className: "ends" }, low, "…", high);
+  const more = element("div", { className: "ends" }, low, "…", high), vary = [];
   if (field.varies && !field.fixed) {
     const tick = element("input", { type: "checkbox", checked: varied.has(field.name) });
     tick.addEventListener("change", () => {
       varied[tick.checked ? "add" : "delete"](field.name);
       document.dispatchEvent(new Event("varied"));
     });
-    more.append(element("label", {}, tick, " vary"));
+    vary.push(element("label", { className: "vary", title: "let a search change it, between the ends of its slider" }, tick, " vary"));
   }
   const unit = element("small", { textContent: field.fixed ? "catalogue" : field.unit });
-  const row = element("div", { className: "field" }, label(field), slider, box, unit, more);
+  const row = element("div", { className: "field" }, label(field), ...vary, slider, box, unit, more);
   more.hidden = true;
   row.addEventListener("focusin", () => { more.hidden = false; });
   row.addEventListener("pointerenter", () => { more.hidden = false; });

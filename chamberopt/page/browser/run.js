@@ -20,12 +20,12 @@ export function fillRun() {
 }
 
 let isRunning = false;
-// A design is simulated; a study is run or swept.
+// A design is simulated; a study is searched or mapped.
 function allow() {
   const { kind, words } = state.file.files.find((one) => one.name === find("of").value) ?? {};
-  find("of-words").textContent = words ?? "";
-  find("search-sliders").disabled = isRunning;
-  for (const button of document.querySelectorAll("[data-command]")) button.disabled = isRunning || (button.dataset.command === "simulate") !== (kind === "design");
+  find("of-words").textContent = kind === "study" ? words : "";
+  for (const button of document.querySelectorAll("[data-command], #search-sliders")) button.disabled = isRunning;
+  for (const one of document.querySelectorAll(".of-design, .of-study")) one.hidden = one.className !== `of-${kind}`;
 }
 find("of").addEventListener("change", () => { allow(); tellDuration(); });
 
@@ -38,7 +38,7 @@ document.querySelector("[data-tab=run]").addEventListener("click", tellDuration)
 
 function showVaried() {
   const items = [...varied].map((name) => element("li", { title: name, textContent: `${state.fields.find((one) => one.name === name)?.in_full}: ${ends.get(name).join(" … ")}` }));
-  find("varied").replaceChildren(...(items.length ? items : [element("li", { textContent: "nothing is ticked" })]));
+  find("varied").replaceChildren(...(items.length ? items : [element("li", { textContent: "nothing is ticked yet" })]));
 }
 document.addEventListener("varied", showVaried);
 
