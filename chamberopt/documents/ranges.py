@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.common import number_text
 from chamberopt.common.key_words import title_with_unit
-from chamberopt.documents.document import AnswerLine, Block, Section, Sentence, Table
+from chamberopt.documents.document import AnswerLine, Block, Fold, Section, Sentence, Table
 from chamberopt.documents.wording import Label, metric_label, objective_label, per_cent, plain
 
 if TYPE_CHECKING:
@@ -147,13 +147,14 @@ def range_section(result: Result) -> Section | None:
         for name, one in group.items()
     ]
     head = ("", "± 95 % of counting", "range", "most of it by")
+    tables = [
+        Table(f"Changes by {WORDS.get(group, group)}, ± 95 % noise of its runs", ENDS_HEAD, own)
+        for group, own in changes.items()
+    ]
     content: list[Block] = [
         Sentence(text),
         Table("The figures and their ranges", head, rows),
-        *(
-            Table(f"Changes by {WORDS.get(group, group)}, ± 95 % noise of its runs", ENDS_HEAD, own)
-            for group, own in changes.items()
-        ),
+        Fold("What each end changes", tables),
         Table("What is not calibrated", ("", "as designed", "low", "high"), numbers),
     ]
     content += [Sentence(one) for one in _left_out(found)]

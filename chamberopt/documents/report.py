@@ -7,7 +7,6 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.checks.check import matters
-from chamberopt.common.errors import one_line
 from chamberopt.common.files import read_file
 from chamberopt.common.number_text import estimate_text, typeset
 from chamberopt.documents.answer import answer, answer_lines
@@ -25,6 +24,7 @@ from chamberopt.documents.document import (
     TextFile,
     values,
 )
+from chamberopt.documents.proposal import matter_of
 from chamberopt.documents.ranges import groups_text, range_section
 from chamberopt.documents.stress import stress_section
 from chamberopt.documents.study import (
@@ -235,7 +235,9 @@ def _count(number: float) -> str:
 def _effects(result: Result) -> Section:
     """Return the section on optional physical effects: which are simulated, and pilot estimates."""
     effects = result.design.effects.model_dump(mode="json", exclude={"auto"})
-    switched = {name: _effect_text(name, value) for name, value in effects.items()}
+    switched = {
+        name.replace("_", " "): _effect_text(name, value) for name, value in effects.items()
+    }
     in_result = values("In this result", switched)
     if pilot := result.record.effects:
         return Section("Physical effects", [in_result, *_advice(pilot)])
@@ -283,7 +285,8 @@ def _effect_text(name: str, value: object) -> str:
 
 def _to_settle(result: Result) -> Section | None:
     """Return what is to be settled with the design before its chamber is built, if anything is."""
-    texts = [one_line(text) for text in result.design.to_settle]
+    found = map(matter_of, result.design.to_settle)
+    texts = [f"{one.mark.capitalize()}{one.text}" for one in found]
     return Section("To be settled before it is built", [Items(texts)]) if texts else None
 
 

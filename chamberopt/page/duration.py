@@ -35,7 +35,9 @@ def duration_in_words(path: Path, results: Iterable[Path]) -> str:
         with suppress(InputError):
             result = load_result(folder)
             if _is_like(design, result.design):
-                return _in_words(evaluations * _seconds(design, result))
+                ranges = result.record.ranges if evaluations == 1 else None
+                ends = ranges.cost if ranges else 0.0  # simulated after the figures
+                return _in_words(evaluations * _seconds(design, result) * (1.0 + ends))
     return ""
 
 

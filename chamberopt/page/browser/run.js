@@ -32,7 +32,7 @@ find("of").addEventListener("change", () => { allow(); tellDuration(); });
 // How long the file will take, where the server knows that from results.
 async function tellDuration() {
   const of = find("of").value, known = await ask("/duration", { of }).catch(() => null);
-  if (find("of").value === of) find("lasts").textContent = known?.words ?? "";
+  if (find("of").value === of) find("lasts").textContent = known?.words ? `It will take ${known.words}.` : "";
 }
 document.querySelector("[data-tab=run]").addEventListener("click", tellDuration);
 

@@ -125,7 +125,7 @@ def test_what_is_to_be_settled_stands_beside_the_answer(simulation: Path) -> Non
     told = "To be settled before it is built"
     assert [one.title for one in document.sections][1:3] == ["The answer", told]
     assert told not in titles
-    assert section_of(document, told).content == [Items([matter])]
+    assert section_of(document, told).content == [Items(["Not masked: ask the customer."])]
     notes = [getattr(one, "text", "") for one in section_of(document, "Notes and warnings").content]
     assert "Warning: thin" in notes
     assert not any(matter in text for text in notes)
