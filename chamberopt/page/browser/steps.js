@@ -39,7 +39,7 @@ function time({ step, done, total }, within) {
 // For how long a command has worked.
 export const sinceBegin = (seconds) => seconds < 120 ? `at work for ${seconds} s` : `at work for ${Math.floor(seconds / 60)} min ${seconds % 60} s`;
 
-const words = (one, within) => `${one.step}${one.total ? `: ${Math.floor(one.done)} of ${one.total}` : one.done ? `: ${Math.floor(one.done)} so far` : ""}${one.best === null ? "" : `, best ${one.best.toFixed(4)}`}${time(one, within)}`;
+const words = (one, within) => `${one.step}${one.total ? `: ${Math.floor(one.done)} of ${one.total}` : one.done ? `: ${Math.floor(one.done)} so far` : ""}${one.best === null ? "" : `, best ${Number(one.best.toPrecision(4))}`}${time(one, within)}`;
 
 // A command in stages as a line of its stage and what is being done of it, and a bar.
 export const stage = ([first, ...inner]) => {

@@ -25,11 +25,23 @@ export function scaleOf({ low, high, texts = [], most = null }, from, to, margin
   return scale;
 }
 
+const LINE = 14, LETTER = 6.5; // px, height of a line and usual width of a letter
+
+// A text in as many lines as a length [px] takes.
+function inLines(text, length) {
+  const lines = [""];
+  for (const word of text.split(" ")) {
+    if (lines.at(-1) && LETTER * (lines.at(-1).length + word.length) > length) lines.push("");
+    lines.push(`${lines.pop()} ${word}`.trim());
+  }
+  return lines;
+}
+
 export class Plot {
   static count = 0;
 
   constructor({ width, height, x, y, title }) {
-    const left = 58, right = 10, top = 8, bottom = 40;
+    const right = 10, top = 8, bottom = 40, lines = inLines(y.label, height - bottom - top), left = 44 + LINE * lines.length;
     this.x = scaleOf(x, left, width - right, 0.04);
     this.y = scaleOf(y, height - bottom, top, y.name ? 0.04 : 0);
     this.floor = height - bottom - 5;
@@ -41,7 +53,8 @@ export class Plot {
     for (const at of this.y.ticks(4))
       axes.append(svg("line", { x1: left, x2: width - right, y1: this.y(at), y2: this.y(at) }), svg("text", { x: left - 5, y: this.y(at) + 4, "text-anchor": "end" }, String(at)));
     axes.append(svg("text", { x: (left + width - right) / 2, y: height - 8, "text-anchor": "middle", class: "name" }, x.label),
-      svg("text", { transform: `translate(13 ${(top + height - bottom) / 2}) rotate(-90)`, "text-anchor": "middle", class: "name" }, y.label));
+      svg("text", { transform: `translate(13 ${(top + height - bottom) / 2}) rotate(-90)`, "text-anchor": "middle", class: "name" },
+        ...lines.map((text, k) => svg("tspan", { x: 0, dy: k && LINE }, text))));
     const frame = svg("rect", { x: left, y: top, width: width - left - right, height: height - bottom - top, class: "frame" });
     this.drawing = svg("svg", { width, height, role: "img" }, svg("title", {}, title),
       svg("clipPath", { id: clip }, frame.cloneNode()), frame, axes, this.inside);
