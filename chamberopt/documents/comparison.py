@@ -21,11 +21,19 @@ MARK = " *"  # of a difference that is more than noise
 
 
 def comparison_end(comparison: Comparison, verbose: bool) -> list[Table | str]:
-    """Return the end of a comparison: a sentence for each later candidate, and the main figures.
+    """Return the end of a comparison on a terminal: its summary, and where more is.
 
     Args:
         verbose: all figures follow, by their names in files, with what would prove a difference.
     """
+    *content, legend = summary(comparison)
+    if verbose:
+        return [*content, *comparison_lines(comparison)]
+    return [*content, f"({legend} --verbose and compare.txt have every figure.)"]
+
+
+def summary(comparison: Comparison) -> list[Table | str]:
+    """Return a sentence for each later candidate, a table of the main figures, and its legend."""
     first, *later = comparison.labels
     goal = comparison.results[0].objective_name
     goal = goal if goal in comparison.metrics else ""  # results of different objectives share none
@@ -45,11 +53,8 @@ def comparison_end(comparison: Comparison, verbose: bool) -> list[Table | str]:
             cells += [f"{label.number(gaps[0].estimate, sign=True)}{MARK * gaps[0].real}"]
         rows.append([label.with_unit, label.number(one), *cells])
     heads = ["", *comparison.labels, *[f"{later[0]} - {first}"] * (not several)]
-    content: list[Table | str] = [*sentences, "", Table("", heads, rows, numbers=False), ""]
-    if verbose:
-        return [*content, *comparison_lines(comparison)]
-    legend = f"(±: 95 % intervals. *: differs from {first} by more than noise."
-    return [*content, f"{legend} --verbose and compare.txt have every figure.)"]
+    legend = f"±: 95 % intervals. *: differs from {first} by more than noise."
+    return [*sentences, "", Table("", heads, rows, numbers=False), "", legend]
 
 
 def _sentence(comparison: Comparison, name: str, label: Label, k: int) -> str:

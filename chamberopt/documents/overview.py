@@ -10,7 +10,7 @@ import numpy as np
 
 from chamberopt.chamber.checks.check import notes
 from chamberopt.documents.answer import answer, answer_lines
-from chamberopt.documents.comparison import comparison_end
+from chamberopt.documents.comparison import summary
 from chamberopt.documents.coverage import figures, figures_table
 from chamberopt.documents.document import Block, Fold, Items, Section, Sentence, Table, values
 from chamberopt.documents.report import limits_of_intervals, notes_of
@@ -102,7 +102,7 @@ def sweep_overview(sweep: SweepResult) -> Section:
 def comparison_overview(comparison: Comparison) -> Section:
     """Return the overview of a comparison: a sentence for each candidate, and the main figures."""
     title = f"Comparison with {comparison.labels[0]}"
-    return Section(title, _blocks(comparison_end(comparison, False)))
+    return Section(title, _blocks(summary(comparison)))
 
 
 def _blocks(lines: Sequence[Table | str]) -> list[Block]:

@@ -128,6 +128,8 @@ def range_section(result: Result) -> Section | None:
         if name != result.objective_name and name not in result.metrics:
             continue  # a figure of another version, which this one does not know
         label = _label(result, name)
+        if any(label.with_unit == row[0] for row in rows):
+            continue  # the objective is a figure too
         rows.append(
             (
                 label.with_unit,

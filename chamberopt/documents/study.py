@@ -12,7 +12,7 @@ import numpy as np
 
 from chamberopt.common.estimate import Estimate, finite_or_none
 from chamberopt.common.files import read_file
-from chamberopt.common.key_words import AIMS, inner_first
+from chamberopt.common.key_words import AIMS, inner_first, title_with_unit
 from chamberopt.documents.document import (
     Beside,
     Block,
@@ -76,7 +76,7 @@ def question_section(result: Result) -> Section:
     limits = f"Constraints: {', '.join(constraints)}." if constraints else NO_CONSTRAINTS
     varied = [
         (
-            name,
+            title_with_unit(name),
             (", " if isinstance(ends[0], str) else " to ").join(map(plain, ends)),
             plain(study.start.parameters[name]),
             plain(study.best.parameters[name]),
