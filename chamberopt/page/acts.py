@@ -25,7 +25,7 @@ from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
 from chamberopt.documents.answer import on_average
-from chamberopt.documents.comparison import comparison_end
+from chamberopt.documents.overview import comparison_overview
 from chamberopt.documents.proposal import matter_of
 from chamberopt.documents.report import answer_section
 from chamberopt.documents.study import aim_in_words
@@ -46,7 +46,6 @@ from chamberopt.page.structure import (
     without_step,
 )
 from chamberopt.page.study_answers import candidate_answer, candidates_answer, model_answer, version
-from chamberopt.printers import terminal
 from chamberopt.printers.html import section
 from chamberopt.printers.report_page import REPORT, parts_content, viewer
 from chamberopt.printers.sheet_page import SHEET
@@ -119,12 +118,12 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
         InputError: a folder has no usable result, or the results cannot be compared.
     """
     html, content = parts_content(folders)
-    several = len(folders) > 1
-    if not several:
+    if len(folders) > 1:
+        first = comparison_overview(compare(folders))
+    else:
         result = load_result(folders[0])
-        html = section(answer_section(result, load_start(result)), viewer) + html
-    text = terminal.text(comparison_end(compare(folders), False)) if several else ""
-    return {"content": content, "html": explained(html), "comparison": text}
+        first = answer_section(result, load_start(result))
+    return {"content": content, "html": explained(section(first, viewer) + html)}
 
 
 MOST_FILES = 20  # versions of the design's text that are kept for the pages that read them

@@ -1,7 +1,7 @@
 // Results below the design's folder: in 3D, one or two side by side, with report and process sheet.
 import { ask, attempt, element, onPage } from "./state.js";
 import { start } from "./run.js";
-import { followStudy } from "./study/study.js";
+import { closeStudy, followStudy } from "./study/study.js";
 
 const find = (id) => document.getElementById(id), list = find("result-list");
 const FILES = [["report", "report.html", "report"], ["sheet", "process_sheet.pdf", "process sheet"]];
@@ -41,10 +41,10 @@ find("show-results").addEventListener("click", () => attempt(() => show()));
 async function show() {
   const folders = [...list.querySelectorAll("input:checked")].map((one) => one.value).reverse(); // the older first
   if (!folders.length || folders.length > 2) throw new Error("tick one result, or two to compare");
-  const { html, content, comparison } = await ask("/shown", { folders });
+  const { html, content } = await ask("/shown", { folders });
+  closeStudy();
   closeResults();
   find("shown").innerHTML = html; // the server's own, as in a report; names in it are escaped
-  if (comparison) find("shown").append(element("pre", { textContent: comparison }));
   find("shown").hidden = find("close-results").hidden = false;
   views = showParts(content);
 }

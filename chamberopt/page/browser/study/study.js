@@ -21,13 +21,13 @@ export function followStudy(of) {
   look();
 }
 
-function close() {
+export function closeStudy() {
   folder = "";
   clearTimeout(looking);
   find("study-view").hidden = true;
   show(null);
 }
-find("close-study").addEventListener("click", close);
+find("close-study").addEventListener("click", closeStudy);
 
 // Look at the study, draw what is new, and look again until it has ended.
 async function look() {

@@ -278,8 +278,9 @@ class View3D {
   }
 
   #aim({ middle, eye, size }) {
+    const far = Math.max(1, 1 / this.camera.aspect); // all is in a narrow view too
     this.orbit.target.set(...middle);
-    this.camera.position.set(...eye);
+    this.camera.position.set(...middle.map((x, i) => x + far * (eye[i] - x)));
     this.camera.near = size / 200;
     this.camera.far = size * 20;
     this.camera.updateProjectionMatrix();
@@ -291,7 +292,7 @@ class View3D {
   from(way = this.camera.position.clone().sub(this.orbit.target).toArray()) {
     const { low, high } = this.extent(), size = Math.hypot(...high.map((x, i) => x - low[i]));
     if (!Number.isFinite(size)) return; // nothing is to be seen
-    const middle = low.map((x, i) => (x + high[i]) / 2), far = 2.2 * size * Math.max(1, 1 / this.camera.aspect) / Math.hypot(...way);
+    const middle = low.map((x, i) => (x + high[i]) / 2), far = 2.2 * size / Math.hypot(...way);
     this.#aim({ middle, size, eye: middle.map((x, i) => x + far * way[i]) });
   }
 
