@@ -70,7 +70,9 @@ function lookAt({ low, high }, way = [0.49, -0.79, 0.35]) {
 
 // Put the part into the chamber that is proposed, as far as it is known.
 async function drawChamber(isDraft) {
+  const isFirst = !find("place-of-chamber").contains(find("seen"));
   find("place-of-chamber").append(find("seen"));
+  if (isFirst) find("made").scrollIntoView({ behavior: "smooth" });
   const answer = unpack(await ask("/chamber", {}));
   if (!seen || answer.state.length !== seen.triangles.length / 3) return; // of another part
   view.pose("part", answer.rotation, answer.shift);
@@ -145,11 +147,12 @@ function tell({ steps, seconds, lines, warnings, fault, exit, picture, result, p
   find("made").hidden = false;
   find("stop").hidden = exit !== null;
   find("busy").textContent = exit !== null ? "" : sinceBegin(seconds);
-  if (exit !== null || steps.length) find("progress").replaceChildren(...(exit === null ? stage(steps) : []));
+  const isStopped = exit === 130, atEnd = isStopped ? ["Stopped."] : [];
+  if (exit !== null || steps.length) find("progress").replaceChildren(...(exit === null ? stage(steps) : atEnd));
   find("warnings").replaceChildren(...warnings.map(warning));
   find("printed").textContent = lines.join("\n");
   find("printed-fold").hidden = exit === null || !lines.length;
-  find("error").hidden = !exit;
+  find("error").hidden = !exit || isStopped;
   find("error").replaceChildren(...fault.flatMap((words) => [...onPage(words), "\n"]));
   find("picture-fold").hidden = !picture;
   if (picture && picture[1] !== drawn) {

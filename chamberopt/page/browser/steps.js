@@ -41,14 +41,20 @@ export const sinceBegin = (seconds) => seconds < 120 ? `at work for ${seconds} s
 
 const words = (one, within) => `${one.step}${one.total ? `: ${Math.floor(one.done)} of ${one.total}` : one.done ? `: ${Math.floor(one.done)} so far` : ""}${one.best === null ? "" : `, best ${Number(one.best.toPrecision(4))}`}${time(one, within)}`;
 
+// Forget the pace of steps that have ended: one of the same name may follow.
+function forget(steps) {
+  for (const step of begun.keys()) if (!steps.some((one) => one.step === step)) begun.delete(step);
+}
+
 // A command in stages as a line of its stage and what is being done of it, and a bar.
 export const stage = ([first, ...inner]) => {
+  forget([first, ...inner]);
   const last = inner.at(-1);
   return [element("div", {}, last ? `${first.step} (${words(last)})` : `${first.step}${time(first)}`, element("progress"))];
 };
 
 export const bars = (steps) => {
-  for (const step of begun.keys()) if (!steps.some((one) => one.step === step)) begun.delete(step);
+  forget(steps);
   return steps.map((one, k) => element("div", {}, words(one, steps[k + 1]),
     Object.assign(element("progress"), one.total ? { max: one.total, value: one.done } : {})));
 };
