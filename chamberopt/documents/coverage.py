@@ -97,7 +97,7 @@ def labels_of(goal: str, metrics: Iterable[str]) -> dict[str, Label]:
     """
     first = {goal: objective_label(goal)} if goal else {}
     known = {label.text for label in first.values()}
-    others = {name: metric_label(name) for name in metrics if "." not in name}
+    others = {name: metric_label(name) for name in metrics if "." not in name and name != goal}
     return first | {name: label for name, label in others.items() if label.text not in known}
 
 

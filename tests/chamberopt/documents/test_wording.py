@@ -5,6 +5,7 @@ import math
 import pytest
 
 from chamberopt.common.estimate import Estimate
+from chamberopt.documents.coverage import labels_of
 from chamberopt.documents.wording import Label, objective_label, plain, with_interval
 
 
@@ -67,3 +68,11 @@ def test_a_label_converts_value_and_half_width_to_its_unit() -> None:
     seconds = objective_label("-0.5 time_to_98_s")
     shown = seconds.scale(Estimate(-35.0, 2.0, in_words="not resolved"))
     assert (shown.value, shown.half_width, shown.in_words) == (70.0, 4.0, "not resolved")
+
+
+def test_an_objective_of_one_figure_has_its_words_and_stands_once() -> None:
+    goal = "minus_time_to_98_s"
+    labels = labels_of(goal, [goal, "mean_coverage", "time_to_98_s"])
+    assert [*labels] == [goal, "mean_coverage"]
+    assert labels[goal].with_unit == "time until 95 % of the area is 98 % covered [s]"
+    assert labels[goal].factor == -1.0
