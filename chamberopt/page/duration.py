@@ -35,9 +35,7 @@ def duration_in_words(path: Path, results: Iterable[Path]) -> str:
         with suppress(InputError):
             result = load_result(folder)
             if _is_like(design, result.design):
-                ranges = result.record.ranges if evaluations == 1 else None
-                ends = ranges.cost if ranges else 0.0  # simulated after the figures
-                return _in_words(evaluations * _seconds(design, result) * (1.0 + ends))
+                return _in_words(_whole_seconds(design, evaluations, result))
     return ""
 
 
@@ -48,6 +46,16 @@ def _is_like(one: Design, other: Design) -> bool:
 
 def _form(design: Design) -> tuple[str, str]:
     return design.part.mesh_path.name, design.chamber.shape
+
+
+def _whole_seconds(design: Design, evaluations: int, result: Result) -> float:
+    """Return the time [s] that a design, or so many evaluations of a study, take, by a result."""
+    if evaluations == 1:
+        ranges = result.record.ranges  # whose ends are simulated after the figures
+        return _seconds(design, result) * (1.0 + (ranges.cost if ranges else 0.0))
+    if study := result.record.study:  # many of its candidates take fewer replicas than its best
+        return evaluations * study.seconds / study.evaluations
+    return evaluations * _seconds(design, result)
 
 
 def _seconds(design: Design, result: Result) -> float:

@@ -1,11 +1,13 @@
 """How long a run will take, by results of like designs."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from chamberopt.design.load import save_design
-from chamberopt.page.duration import duration_in_words
+from chamberopt.page.duration import _whole_seconds, duration_in_words
 from chamberopt.results.load import Result
 from tests.helpers.results.short_plate import plate_result
 from tests.helpers.synthetic import DESIGNS
@@ -29,6 +31,9 @@ def test_a_study_takes_as_long_as_its_evaluations(result: Result, tmp_path: Path
     (tmp_path / "study.toml").write_text(f"{study}[optimizer]\nevaluations = 100000\n")
     words = duration_in_words(tmp_path / "study.toml", [result.folder])
     assert words.endswith(("minutes", "hours"))
+    known = SimpleNamespace(study=SimpleNamespace(seconds=366.0, evaluations=6))
+    like: Any = SimpleNamespace(record=known)
+    assert _whole_seconds(result.design, 9, like) == 549.0
 
 
 def test_nothing_is_said_of_another_part(result: Result) -> None:
