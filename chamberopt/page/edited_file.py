@@ -42,10 +42,7 @@ from chamberopt.page.structure import (
 Changes = Mapping[str, Any]
 LONGEST_SAVE_S = 5.0  # wait for another page's save, which takes a tenth of a second
 LATE_WRITE_S = 0.05  # an editor takes far less from opening a file to writing it
-FACETS, ACCURACY = (
-    "chamber.facets",
-    "process.accuracy",
-)  # a number and the table that it is shown in
+FACETS, ACCURACY = "chamber.facets", "process.accuracy"  # a number, and where it is shown
 TO_SETTLE = "to_settle"  # from which the page takes out what is settled
 # Keys that the page changes beside its fields: zones, and the faces of target, zone or fixture.
 PICKED = re.compile(

@@ -137,7 +137,9 @@ def explained(html: str) -> str:
     known: set[str] = set()
 
     def told(one: str | tuple[str, str]) -> str:
-        return one if isinstance(one, str) else f'<abbr title="{escape(one[1])}">{one[0]}</abbr>'
+        if isinstance(one, str):
+            return one
+        return f'<abbr title="{escape(one[1])}">{one[0]}</abbr>'
 
     return _SAID.sub(lambda said: said[1] + "".join(map(told, on_page(said[2], known))), html)
 
