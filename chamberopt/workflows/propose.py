@@ -221,17 +221,17 @@ class _Pilots:
     def improve(self, first: Proposal) -> Proposal:
         """Return a proposal that pilots chose, with its treatment time and what to simulate.
 
+        Pilots are brief until all is chosen: only then the shot has to settle.
+
         Raises InputError if an intensity that was asked for cannot be told.
         """
         quietly = partial(self._measure, is_told=False)
-        self.begin(TIME)
-        way = Way(first, self.wishes.geometry, self._measure(first))
-        self.begin(WAYS)
         briefly = partial(quietly, is_brief=True)
+        self.begin(TIME)
+        way = Way(first, self.wishes.geometry, self._measure(first, is_brief=True))
+        self.begin(WAYS)
         made, wanted, found = propose_quicker(way, self._again, briefly)
-        if found is not None and not found.settled and made.design != first.design:
-            found = quietly(made)
-        made, found = propose_second_pose(made, found, quietly)
+        made, found = propose_second_pose(made, found, briefly)
         wanted = replace(wanted, turned_over=bool(made.design.steps))
         why_so = {key: made.reasons[key] for key in OF_POSES if key in made.reasons}
         intensity, asked = self.wishes.intensity, self.wishes.asked_intensity()
@@ -250,7 +250,7 @@ class _Pilots:
                     raise
                 asked = None
             else:  # with these balls it may be worth turning it over
-                over, _ = propose_second_pose(made, found, quietly)
+                over, _ = propose_second_pose(made, found, briefly)
                 if over.design.steps and not start.design.steps:
                     why_so = {**why_so, ".steps": over.reasons[".steps"]}
                     other = replace(wanted, turned_over=True)
@@ -282,10 +282,12 @@ class _Pilots:
             two, why = with_finer_balls(coarse.made, coarse.found, by_geometry, quietly)
             if two is not None:
                 return replace(with_thin_places(two), trials=trials)
-            if taken := larger_instead(now, others, trials, asked):
-                now = taken._replace(found=quietly(taken.made) or taken.found)
+            now = larger_instead(now, others, trials, asked) or now
             now = now._replace(made=without_finer(now.made, why))
-        return replace(_in_budget(now.made, now.found), trials=trials)
+        found = now.found
+        if found is not None and not found.settled:
+            found = quietly(now.made) or found
+        return replace(_in_budget(now.made, found), trials=trials)
 
     def _for_intensity(
         self, start: Proposal, wanted: Wanted, asked: WantedIntensity, why_so: dict[str, str]
@@ -297,7 +299,7 @@ class _Pilots:
             why_so: reasons to be kept, by dotted name.
         """
         made = _told(propose_intensity(start, wanted, asked, self._again, self._predict), why_so)
-        return made, self._measure(made)
+        return made, self._measure(made, is_brief=True)
 
     def _compared(
         self,
