@@ -343,8 +343,10 @@ def _proposed(
     made = padded(masked(made, floor, bores, wanted.shop), floor, target, wanted.shop)
     made = only_touched(made, floor, wanted.shop)
     reasons = {**made.reasons, **_room_reason(made, floor)}
-    if made.design.shot.count <= MANY:  # that many are under the whole part, not in this chamber
-        reasons["shot.diameter_mm"] = re.sub("; MANY BALLS[^;]*", "", reasons["shot.diameter_mm"])
+    count, ball = made.design.shot.count, reasons["shot.diameter_mm"]
+    if count <= MANY:  # that many are under the whole part, not in this chamber
+        ball = re.sub("; MANY BALLS[^;]*", "", ball)
+    reasons["shot.diameter_mm"] = re.sub("some [0-9,]+ under the whole part", f"{count:,}", ball)
     return replace(made, reasons=reasons)
 
 

@@ -179,7 +179,7 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
     posed = proposal.chamber.part
     if (sharp := sharp_edges(posed.vertices, posed.triangles, posed.target)) > LEAST_EDGES:
-        found.append(LeftOut({}, f"SHARP EDGES, {1e3 * sharp:.3g} mm of the target's{EDGES}"))
+        found.append(LeftOut({}, f"SHARP EDGES, {1e3 * sharp:.0f} mm of the target's{EDGES}"))
     beside = [one for one in proposal.known if not np.any(one.triangles & target)]
     names = {one.name for one in [*beside, *_bodies_of(proposal, target, beside)]}
     others = [one for one in proposal.known if one.name in names]
