@@ -201,7 +201,7 @@ def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
         best, small = as_good, suited[-1]
         text = (
             f"serves {best.served:.0%} of the target; {_mm(small)} would serve {small.served:.0%}, "
-            f"but take {small.count:,} of them, not {best.count:,}"
+            f"but take {small.count / best.count:.2g} times as many"
         )
     else:
         best = as_good
