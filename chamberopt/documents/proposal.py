@@ -270,7 +270,8 @@ def _trials(made: Proposal) -> Table:
     rows = []
     for one in made.trials:
         known = one.intensity
-        after = f"{rounded(one.time_to_98, 2)} s" if one.time_to_98 else "not resolved"
+        after = f"{rounded(one.time_to_98, 2)} s" if one.time_to_98 else "not known"
+        after += "" if one.is_of_places or not one.time_to_98 else " on average"
         row = [
             f"{one.ball_mm:g} mm" + ", taken" * (one.ball_mm in taken),
             f"{one.fit.touched:.0%}",

@@ -287,9 +287,14 @@ class _Pilots:
         found = now.found
         if found is not None and not found.settled:
             found = quietly(now.made) or found
-        ball = setting_of(now.made).ball_mm  # of which one time is told
-        time = found.time_to_98 if found is not None and found.places else None
-        trials = tuple(replace(x, time_to_98=time) if x.ball_mm == ball else x for x in trials)
+        if found is not None:
+            ball = setting_of(now.made).ball_mm  # of which one time is told
+            trials = tuple(
+                replace(one, time_to_98=found.time_to_98, is_of_places=found.places)
+                if one.ball_mm == ball
+                else one
+                for one in trials
+            )
         return replace(_in_budget(now.made, found), trials=trials)
 
     def _for_intensity(

@@ -76,8 +76,9 @@ class BallTrial:
         amplitude_um: of the sonotrode, zero-to-peak.
         count, sonotrode_count: of balls, and of sonotrodes side by side.
         fit: how the balls suit the target, without a chamber.
-        time_to_98: after which 95 % of the target is 98 % covered, by a pilot [s]; None if no
-            pilot resolved it.
+        time_to_98: after which 95 % of the target is 98 % covered, by a pilot [s]; None if that
+            is not known.
+        is_of_places: false if it is that of the target on average, as no place was resolved.
         intensity: Almen intensity by that pilot; None if it is not known.
         harm: why no pilot ran, in words; empty if one did.
     """
@@ -88,6 +89,7 @@ class BallTrial:
     sonotrode_count: int
     fit: SizeFit
     time_to_98: float | None
+    is_of_places: bool
     intensity: PredictedIntensity | None
     harm: str
 

@@ -227,7 +227,8 @@ def of_ball_sizes(all_of: Sequence[Compared]) -> tuple[BallTrial, ...]:
             one.made.design.shot.count,
             one.made.sonotrode_count,
             fit,
-            None if one.found is None or not one.found.places else one.found.time_to_98,
+            None if one.found is None else one.found.time_to_98,
+            one.found is not None and one.found.places,
             None if one.found is None else one.found.intensity,
             one.harm,
         )

@@ -1,11 +1,15 @@
 """The end of `new` on a terminal."""
 
+from dataclasses import replace
+
 import pytest
 import trimesh
 
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.proposal import Proposal, Wanted
+from chamberopt.chamber.propose.proposal import BallTrial, Proposal, Wanted
+from chamberopt.chamber.propose.proposed_balls import SizeFit
 from chamberopt.chamber.propose.proposed_mask import LeftOut
+from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.documents.proposal import (
     WIDTH,
     clauses,
@@ -33,6 +37,29 @@ def test_all_that_is_to_be_settled_is_one_list(made: Proposal) -> None:
     assert not any(mark in told for mark in ("ALLOY NOT", "NOT MEASURED", "NOT MASKED"))
     assert told.startswith("Peen face 1 (")
     assert max(map(len, text.splitlines())) <= WIDTH
+
+
+def test_the_balls_that_pilots_compared_are_one_table(made: Proposal) -> None:
+    """Each row has what is known of it: a time of places or on average, or why no pilot ran."""
+    assert proposal_in_words(made, []).trials is None
+    ball = made.tables["shot"]["diameter_mm"]
+    fit = SizeFit(1e-3 * ball, 0.99, 0.93, True, 0.0, 100)
+    known = PredictedIntensity(0.214, 0.1, 0.4, 2.5)
+    first = BallTrial(ball, 40.0, 1200, 1, fit, 812.0, True, known, "")
+    second = replace(first, ball_mm=ball + 1.0, time_to_98=95.0, is_of_places=False, intensity=None)
+    third = replace(second, ball_mm=ball + 2.0, time_to_98=None, harm="balls jam in a gap")
+    told = proposal_in_words(replace(made, trials=(first, second, third)), []).trials
+    assert told is not None
+    assert told.rows == [
+        [f"{ball:g} mm, taken", "99%", "93%", "40 µm", "0.21 mmA", "810 s", "1,200"],
+        [f"{ball + 1:g} mm", "99%", "93%", "40 µm", "not known", "95 s on average", "1,200"],
+        [f"{ball + 2:g} mm", "99%", "93%", "40 µm", "not known", "balls jam in a gap", "1,200"],
+    ]
+    two = replace(second, sonotrode_count=2)
+    several = proposal_in_words(replace(made, trials=(first, two)), [])
+    assert several.trials is not None
+    assert [row[-1] for row in several.trials.rows] == ["1", "2"]
+    assert several.trials in proposal_lines(several, verbose=False)
 
 
 def test_verbose_has_every_reason_and_every_surface(made: Proposal) -> None:
