@@ -278,11 +278,13 @@ def _trials(made: Proposal) -> Table:
             f"{one.fit.served:.0%}",
             f"{one.amplitude_um:g} µm",
             f"{plain(known.value, 2)} mmA" if known else "not known",
-            one.harm or after,
+            "not tried" if one.harm else after,
             f"{one.count:,}",
         ]
         rows.append(row + [str(one.sonotrode_count)] * several)
-    return Table("Balls that pilots compared, each size in a chamber of its own", head, rows)
+    untried = "".join(f"; {x.ball_mm:g} mm not tried: {x.harm}" for x in made.trials if x.harm)
+    text = f"Balls that pilots compared, each size in a chamber of its own{untried}"
+    return Table(text, head, rows)
 
 
 def _numbers(table: Mapping[str, object]) -> Iterator[tuple[str, float]]:

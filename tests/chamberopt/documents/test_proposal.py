@@ -53,8 +53,9 @@ def test_the_balls_that_pilots_compared_are_one_table(made: Proposal) -> None:
     assert told.rows == [
         [f"{ball:g} mm, taken", "99%", "93%", "40 µm", "0.21 mmA", "810 s", "1,200"],
         [f"{ball + 1:g} mm", "99%", "93%", "40 µm", "not known", "95 s on average", "1,200"],
-        [f"{ball + 2:g} mm", "99%", "93%", "40 µm", "not known", "balls jam in a gap", "1,200"],
+        [f"{ball + 2:g} mm", "99%", "93%", "40 µm", "not known", "not tried", "1,200"],
     ]
+    assert told.caption.endswith(f"; {ball + 2:g} mm not tried: balls jam in a gap")
     two = replace(second, sonotrode_count=2)
     several = proposal_in_words(replace(made, trials=(first, two)), [])
     assert several.trials is not None
