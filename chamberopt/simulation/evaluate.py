@@ -13,6 +13,7 @@ from chamberopt.chamber.analytic import cavity_note
 from chamberopt.chamber.checks.check import amplitude_notes, friction_notes
 from chamberopt.chamber.checks.fillets import facet_warnings
 from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.common.errors import InputError
 from chamberopt.common.executor import share
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.dents import dent_diameter
@@ -309,11 +310,18 @@ def require_figures(design: Design, chamber: Chamber, mesh: TriangleMesh) -> Non
 def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
     """Return the target of a chamber with windows, discs in which its coverage is measured.
 
-    Raises InputError if no triangle of the target bounds the cavity, or windows are too small.
+    Raises InputError if no triangle of the target bounds the cavity, no ball touches any of it, or
+    windows are too small.
     """
-    return find_target_field(
-        chamber, rooms_of(design, chamber, mesh), window_setting(design, chamber)
-    )
+    window = window_setting(design, chamber)
+    found = find_target_field(chamber, rooms_of(design, chamber, mesh), window)
+    if not found.reachable > 0.0:
+        raise InputError(
+            f"part.target: a ball of {1e3 * window.ball:g} mm touches nothing of it in this "
+            "chamber, so it has no figures; let more of the part stand in the chamber, or use "
+            "smaller balls"
+        )
+    return found
 
 
 def rooms_of(design: Design, chamber: Chamber, mesh: TriangleMesh) -> Rooms:

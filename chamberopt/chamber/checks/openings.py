@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
 
 
+THIN = 5e-5  # m: sides of openings below it are none
+
+
 class Opening(NamedTuple):
     """An opening of the wall, filled by the part that goes out through it."""
 
@@ -48,7 +51,16 @@ def find_openings(chamber: Chamber) -> list[Opening]:
         used, numbers = np.unique(ends, return_inverse=True)
         one, two = numbers.reshape(-1, 2).T
         piece = connected_pieces(one, two, len(used))[1] if len(used) else used
-        loops = [_opening(chamber, wall, outward, joint, piece[one] == k) for k in set(piece)]
+        loops = []
+        edges_only: dict[tuple[float, ...], np.ndarray] = {}  # by the direction of their wall
+        for own in (piece[one] == k for k in set(piece)):
+            loop = _opening(chamber, wall, outward, joint, own)
+            if min(loop.size) > THIN:
+                loops.append(loop)
+            else:  # where a part as wide as the chamber ends it, of which other sides meet no wall
+                key = tuple(np.round(_out(outward, joint, own), 3))
+                edges_only[key] = edges_only.get(key, False) | own
+        loops += [_opening(chamber, wall, outward, joint, own) for own in edges_only.values()]
         loops.sort(key=lambda opening: -np.prod(opening.size))
         for loop in loops:
             if not any(_is_inside(loop, other) for other in found if other.wall == wall):
@@ -68,8 +80,7 @@ def _opening(
     """
     points = chamber.vertices[sides_of(chamber.triangles)[joint[own]].reshape(-1)]
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    out = outward[joint[own] // 3].sum(axis=0)
-    out = out / np.linalg.norm(out)
+    out = _out(outward, joint, own)
     if wall == CEILING:
         size = np.ptp(points[:, :2], axis=0)
     else:
@@ -78,6 +89,12 @@ def _opening(
     beyond = float(((chamber.part.vertices - middle) @ out).max())
     x, y, z = map(float, middle)
     return Opening(wall, (float(size[0]), float(size[1])), (x, y, z), beyond)
+
+
+def _out(outward: np.ndarray, joint: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Return the mean unit normal (3,) of the wall beside sides of triangles, as of `_opening`."""
+    out = outward[joint[own] // 3].sum(axis=0)
+    return np.asarray(out / np.linalg.norm(out))
 
 
 def _is_inside(one: Opening, other: Opening) -> bool:

@@ -48,12 +48,13 @@ const CHAMBER = ["walls", "sonotrode", "edges"];
 async function draw(part) {
   find("place").append(find("seen"));
   find("place").hidden = !part;
-  if (part === drawnPart && !view.get("walls")) return;
+  const drawn = part && `${part} in ${known.unit}`; // its numbers have another size in another unit
+  if (drawn === drawnPart && !view.get("walls")) return;
   for (const name of ["part", ...CHAMBER]) view.remove(name);
-  drawnPart = part;
+  drawnPart = drawn;
   if (!part) return;
   const told = unpack(await ask("/view", { part, unit: known.unit }));
-  if (part !== drawnPart) return;
+  if (drawn !== drawnPart) return;
   seen = told;
   tools.legend(find("legend"), seen.kinds);
   pointed = seen.pointed;

@@ -1,11 +1,15 @@
 """An evaluation does not depend on the workers and stops at the wanted accuracy or the budget."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
@@ -302,3 +306,16 @@ def test_a_replica_tells_how_far_it_has_come() -> None:
     assert (here.done, elsewhere.done) == (pytest.approx(1.0), 0.0)
     here.tell(2, 0.25)
     assert here.done == pytest.approx(1.25)
+
+
+def test_a_target_that_no_ball_touches_has_no_figures(tmp_path: Path) -> None:
+    """The bottom of a slot of 2 mm, and balls of 3 mm. A search refuses such a candidate."""
+    block, slot = trimesh.creation.box((30, 30, 20)), trimesh.creation.box((2, 40, 20))
+    slot.apply_translation((0.0, 0.0, 5.0))
+    trimesh.boolean.difference([block, slot]).export(tmp_path / "slotted.stl")
+    bottom = [{"at_mm": [0.0, 0.0, -5.0]}]
+    made = propose(tmp_path / "slotted.stl", Wanted("mm", ball_mm=3.0), lambda known: [])
+    design = made.design.changed({"part.target": {"faces": bottom}, "mask": None, "holder": None})
+    chamber = build_chamber(design)
+    with pytest.raises(InputError, match=r"part\.target: a ball of 3 mm touches nothing of it"):
+        prepare_target(design, chamber, chamber_mesh(chamber))

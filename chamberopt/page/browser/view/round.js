@@ -6,7 +6,8 @@ class Round {
   static ALONG = 0.02; // of a facet's normal along the axis, sine
   static AWAY = 0.01; // of the radius, between a corner and the circle
   static SWEEP = Math.PI / 4; // least that a round surface turns
-  static CORNERS = 12; // least of a round border
+  static FACETS = 6, CORNERS = 12; // least of a round surface, as any three points lie on a circle; of a round border
+  static OTHER = 0.005; // rad, between the normals of two facets
   static TRIED = 6; // facets beside the one that is met, each of which gives an axis
 
   // Circle round the axis of the round surface at a triangle of a mesh, or round border of the flat face there that is
@@ -64,7 +65,8 @@ class Round {
     const all = Round.#flood(beside, seeds, belongs), circle = Round.#circle(all.flatMap(corners));
     const turns = all.map((k) => { const [x, y] = plane.of(normals[k]); return Math.atan2(y, x); }).sort((a, b) => a - b);
     const gap = turns.reduce((most, turn, i) => Math.max(most, (turns[i + 1] ?? turns[0] + 2 * Math.PI) - turn), 0);
-    return 2 * Math.PI - gap < Round.SWEEP ? null : { ...plane.on(circle, place.dot(axis)), count: all.length };
+    const facets = turns.filter((turn, i) => !i || turn - turns[i - 1] > Round.OTHER).length;
+    return 2 * Math.PI - gap < Round.SWEEP || facets < Round.FACETS ? null : { ...plane.on(circle, place.dot(axis)), count: all.length };
   }
 
   // The border of a flat face that is nearest to a place, if it is round.

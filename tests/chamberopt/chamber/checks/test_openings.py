@@ -42,6 +42,15 @@ def test_a_bar_through_both_side_walls_and_a_post_through_the_ceiling(tmp_path: 
         assert 1e3 * one.beyond == pytest.approx(20)
 
 
+def test_a_plate_that_closes_the_chamber_leaves_one_opening(tmp_path: Path) -> None:
+    """A plate as long as the chamber goes out through its ceiling: two straight joints."""
+    plate = trimesh.creation.box((60, 12, 50))
+    one, *_ = find_openings(chamber_of(tmp_path, plate))
+    assert one.wall == "the ceiling"
+    assert 1e3 * np.array(one.size) == pytest.approx([60, 12], abs=1e-6)
+    assert 1e3 * one.beyond == pytest.approx(15 + 50 - 40)
+
+
 def test_a_pipe_has_one_opening_and_a_part_in_the_air_none(tmp_path: Path) -> None:
     pipe = trimesh.creation.annulus(6.0, 8.0, 60.0, sections=64)
     plate = trimesh.creation.cylinder(8.0, 2.0, sections=64)
