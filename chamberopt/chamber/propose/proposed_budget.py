@@ -221,6 +221,8 @@ def _said_of_treatment(found: Measured, treatment: float, coverage_percent: floa
     if found.places and found.spread > ROUGH * found.time_to_98:
         known = f"to ± {found.spread / found.time_to_98:.0%}"
         long += f"; TIME KNOWN ROUGHLY, {known}: simulate before it is set"
+    if not found.places:
+        long += "; TIME NOT RESOLVED for single places: simulate before it is set"
     wanted = ""
     if coverage_percent is not None:
         times = rounded(coverage_percent / 100.0, 3)

@@ -210,7 +210,8 @@ def _over_the_face(sizes: Sizes, shop: Shop, face: Face) -> Floor:
     def room(sides: Iterable[float]) -> str:
         """Return in words how wide the room must be where its wall goes round the face."""
         wide = " x ".join(f"{one + 2.0 * shop.clearance_mm:g}" for one in sides)
-        return f"{clear}, a slit that is not simulated: build it {wide} mm wide"
+        gaps = "" if face.blocks is None else " and the gaps between the blocks"
+        return f"BUILD IT {wide} mm wide, as the slit round {name}{gaps} is not simulated"
 
     plan = dict(zip(("length_mm", "width_mm"), _along(sizes, face), strict=True))
     if sizes.shape == "cylinder":
@@ -225,11 +226,13 @@ def _over_the_face(sizes: Sizes, shop: Shop, face: Face) -> Floor:
     ):
         more = min(plan[key] - float(sizes.plan[key]) for key in plan)
         wider = replace(sizes, plan={**sizes.plan, **plan}, gap=sizes.gap + 5e-4 * more)
-        text = f"the face of {name}, the wall round it {room(plan.values())}"
+        text = f"the face of {name}, the wall round it {clear}; {room(plan.values())}"
         return Floor(wider, face, text)
     where = f"ends over its face, {clear}"
     if sides := [one for key, one in plan.items() if float(sizes.plan.get(key, 0.0)) >= one]:
-        where = f"goes round it on two sides, {room(sides)} there, and ends over its face elsewhere"
+        where = (
+            f"goes round it on two sides, {clear}, and ends over its face elsewhere; {room(sides)}"
+        )
     return Floor(sizes, face, f"on {name}: the wall {where}")
 
 

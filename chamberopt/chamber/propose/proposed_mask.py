@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from chamberopt.chamber.build import Chamber
+from chamberopt.chamber.checks.openings import Opening, find_openings
 from chamberopt.chamber.part import chosen_on_part, chosen_triangles
 from chamberopt.chamber.propose.pose import Turns
 from chamberopt.chamber.propose.proposal import Proposal, touched_share
@@ -28,6 +29,7 @@ from chamberopt.chamber.propose.proposed_target import (
 from chamberopt.design.design import Design
 from chamberopt.design.part import Selection
 from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.meshes.surface_error import format_point
 from chamberopt.geometry.triangles import (
     area_vectors,
     areas,
@@ -55,6 +57,7 @@ EDGES = (
     " outer edges turn by more than 45 degrees in the file: break them before it is peened, as "
     "dents roll a burr over them, or guard those that are thin (no source read)"
 )
+MOVED_MM = 0.3  # of an opening, which is milled round the part with less play
 # Names of what fits to other parts, whose size and finish shot would change.
 NEVER = re.compile(
     r"(?<![a-z])(?:bores?|(?:\w+.)?holes?|threads?|(?:bearing|valve)?.?seats?|key.?ways?|splines?)"
@@ -180,11 +183,37 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     posed = proposal.chamber.part
     if (sharp := sharp_edges(posed.vertices, posed.triangles, posed.target)) > LEAST_EDGES:
         found.append(LeftOut({}, f"SHARP EDGES, {1e3 * sharp:.0f} mm of the target's{EDGES}"))
+    if text := moved_openings(proposal.chamber):
+        found.append(LeftOut({}, text))
     beside = [one for one in proposal.known if not np.any(one.triangles & target)]
     names = {one.name for one in [*beside, *_bodies_of(proposal, target, beside)]}
     others = [one for one in proposal.known if one.name in names]
     found += _met_beside(proposal, others[:MOST_LOOKED_AT], float(area[target].sum()))
     return found
+
+
+def _moved_mm(one: Opening, other: Opening) -> float:
+    """Return by how much places or sizes of two openings differ [mm]."""
+    here, there = ((*x.place, *x.size) for x in (one, other))
+    return float(1e3 * np.abs(np.subtract(here, there)).max())
+
+
+def moved_openings(chamber: Chamber) -> str:
+    """Return in words where the part goes out in a second pose, if that is elsewhere; else ""."""
+    if not chamber.steps:
+        return ""
+    first, *others = map(find_openings, chamber.steps)
+    for one in first:
+        for other in others:
+            like = [x for x in other if x.wall == one.wall]
+            near = min(like, key=lambda x: _moved_mm(one, x), default=None)
+            if near is None or _moved_mm(one, near) > MOVED_MM:
+                before, after = (x and format_point(np.array(x.place)) for x in (one, near))
+                return (
+                    f"OPENINGS MOVE in the second pose, one from {before} to {after or 'none'}: a "
+                    "second wall or insert, and jaws that suit it"
+                )
+    return ""
 
 
 def sharp_edges(vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> float:

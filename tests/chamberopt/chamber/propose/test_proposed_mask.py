@@ -1,10 +1,14 @@
 """Surfaces that must not be peened, by their names."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.propose.proposed_mask import NEVER, pads, sharp_edges
+from chamberopt.chamber.checks.openings import Opening
+from chamberopt.chamber.propose import proposed_mask
+from chamberopt.chamber.propose.proposed_mask import NEVER, moved_openings, pads, sharp_edges
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
 
@@ -57,3 +61,21 @@ def test_sharp_edges_are_those_of_the_target_that_turn_outwards() -> None:
         assert sharp_edges(1e-3 * both.vertices, both.faces, target) == pytest.approx(1e-3 * length)
     ball = trimesh.creation.icosphere(3)
     assert sharp_edges(ball.vertices, ball.faces, np.ones(len(ball.faces), bool)) == 0.0
+
+
+def test_openings_that_move_in_a_second_pose_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = Opening("the wall", (0.02, 0.01), (0.03, 0.0, 0.015), 0.02)
+    up = here._replace(place=(0.03, 0.0, 0.017))
+    top = here._replace(wall="the ceiling")
+
+    def told(*poses: list[Opening]) -> str:
+        monkeypatch.setattr(proposed_mask, "find_openings", lambda step: step)
+        return moved_openings(SimpleNamespace(steps=poses))  # type: ignore[arg-type]
+
+    assert told() == told([here, top], [top, here]) == ""
+    assert told([here], [up]).startswith(
+        "OPENINGS MOVE in the second pose, one from (30, 0, 15) mm to (30, 0, 17) mm: a second wall"
+    )
+    assert " to none: " in told([here], [top])
+    wider = here._replace(size=(0.02, 0.012))
+    assert "OPENINGS MOVE" in told([here], [wider])

@@ -67,15 +67,15 @@ def test_a_wall_round_a_face_is_wider_by_its_clearance(clear: float) -> None:
     wide = 60.0 + 2.0 * clear
     found = floor({"diameter_mm": 52.0}, "cylinder", own)
     assert (
-        f"the wall round it {clear:g} mm clear, a slit that is not simulated: build it {wide:g} mm"
+        f"the wall round it {clear:g} mm clear; BUILD IT {wide:g} mm wide, as the slit round "
         in found.reason
     )
     found = floor({"length_mm": 110.0, "width_mm": 30.0}, "box", own)
     assert found.reason.endswith(f"the wall ends over its face, {clear:g} mm clear")
     found = floor({"length_mm": 60.0, "width_mm": 50.0}, "box", own)
     assert (
-        f"on two sides, {clear:g} mm clear, a slit that is not simulated: build it "
-        f"{50.0 + 2.0 * clear:g} mm" in found.reason
+        f"on two sides, {clear:g} mm clear, and ends over its face elsewhere; BUILD IT "
+        f"{50.0 + 2.0 * clear:g} mm wide" in found.reason
     )
 
 
