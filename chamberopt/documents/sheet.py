@@ -335,7 +335,8 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
     holder = result.design.holder
     if holder is not None and holder.kind == "bore":
         play = f"{plain(holder.clearance_mm)} mm of clearance all round"
-        yield "holder", f"the part's own end in a bore, {play if holder.clearance_mm else 'tight'}"
+        play = play if holder.clearance_mm else "tight"
+        yield "holder", f"the part itself, out through the wall, {play}"
     mask = result.design.mask
     if holder is None and not result.record.chamber.pieces_in_air:
         padded = mask is not None and mask.axis is not None and not openings

@@ -134,7 +134,7 @@ def propose_intensity(
     pilot = found[chosen]
     one = replace(one, strength_dents=pilot.dents, predicted=pilot.predicted)
     told = with_amplitude(one, chosen), intensity, pilot.predicted
-    return _told(*told, reason)
+    return _told(*told, setting_of(made).ball_mm, reason)
 
 
 def _of_larger(
@@ -390,12 +390,17 @@ def with_prediction(
 
 
 def _told(
-    made: Proposal, wanted: WantedIntensity, predicted: PredictedIntensity, by_geometry: str
+    made: Proposal,
+    wanted: WantedIntensity,
+    predicted: PredictedIntensity,
+    largest: float,
+    by_geometry: str,
 ) -> Proposal:
     """Return a proposal with the reasons for its balls and its amplitude.
 
     Args:
-        by_geometry: reason for the balls that geometry alone would have given.
+        largest: diameter of the balls that geometry alone would have given [mm].
+        by_geometry: reason for them.
     """
     key = amplitudes_of(made.sonotrode)[0]
     off, more = wanted.off(predicted.value), ""
@@ -407,7 +412,7 @@ def _told(
     if made.reasons["shot.diameter_mm"] == by_geometry:
         ball = f"{by_geometry}; {ball}"
     else:
-        ball += f", among balls that serve the target; the largest of them: {by_geometry}"
+        ball += f", among balls that serve the target, up to {largest:g} mm: {by_geometry}"
     reasons["shot.diameter_mm"] = ball
     return with_prediction(replace(made, reasons=reasons), wanted, predicted, more)
 

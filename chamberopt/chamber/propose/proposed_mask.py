@@ -275,8 +275,14 @@ def _met_beside(
         return
     met = [(one, inside, wholes[one.name]) for one, inside in apart(found)]
     met.sort(key=lambda one: (not RUNNING.search(one[0].name), one[1] <= MET * one[2]))
+    target = chamber.part.target
+
+    def named(one: Surface) -> str:
+        is_body = np.any(rows_of(design, one.keys) & target)
+        return f"the rest of {one.name}" if is_body else one.name
+
     names = [
-        f"{one.name} ({area_in_mm2(inside)}{'' if inside > NEARLY_ALL * whole else ' of it'})"
+        f"{named(one)} ({area_in_mm2(inside)}{'' if inside > NEARLY_ALL * whole else ' of it'})"
         for one, inside, whole in met[:MOST_NAMED]
     ]
     more = f" and {len(met) - MOST_NAMED} more" if len(met) > MOST_NAMED else ""
@@ -285,5 +291,5 @@ def _met_beside(
     yield LeftOut(
         {},
         f"{still}NOT MASKED: the shot also meets {', '.join(names)}{more}; {runs}what has to keep "
-        "its size and finish takes a [mask] (docs/how_to/chambers.md)",
+        "its size and finish takes a mask",
     )

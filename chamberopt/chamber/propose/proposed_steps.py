@@ -46,10 +46,11 @@ from chamberopt.chamber.propose.proposed_budget import (
 from chamberopt.chamber.propose.proposed_floor import of_blocks
 from chamberopt.chamber.propose.proposed_intensity import LARGER
 from chamberopt.chamber.propose.proposed_setting import setting_of
-from chamberopt.chamber.propose.quicker import SLOW, longest_of_choice, turns
+from chamberopt.chamber.propose.quicker import SLOW, turns
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain, rounded
 
+WORTH = 2.0 / 3.0  # of the time in one pose, in which a second set-up, often with its own wall, is
 RAISED = 1.0, 2.0, 3.0  # ball diameters by which a ceiling is raised for a second pose
 # When two sizes pay, by heart: coarse balls serve MOSTLY of the target, their intensity is so many
 # times that of the finer ones, and these serve more of the target in less time. For fillets, where
@@ -89,12 +90,12 @@ def propose_second_pose(
     if harm := new_harm(two, made):
         return dropped(harm)
     try:
-        after = measure(two, math.inf if is_hidden else longest_of_choice(found))
+        after = measure(two, math.inf if is_hidden else WORTH * found.time_to_98)
     except TooSlowError as error:
         return dropped(f"by a pilot {error} then, in one pose {found.in_words}")
     if after is None or not after.places:
         return dropped("no pilot resolved it")
-    enough = after.time_to_98 <= longest_of_choice(found) or is_hidden
+    enough = after.time_to_98 <= WORTH * found.time_to_98 or is_hidden
     if not enough or (is_hidden and touched_share(two) < COVERED):
         return dropped(f"by a pilot {after.in_words} then, in one pose {found.in_words}")
     before = f"{touched_share(made):.0%} of the target is in reach" if is_hidden else found.in_words

@@ -62,17 +62,21 @@ function numberRow(field) {
     const span = slider.max - slider.min;
     slider.step = field.whole ? 1 : 10 ** Math.floor(Math.log10(span / 100)) || "any";
   };
+  const bound = (wanted) => {
+    ends.set(field.name, wanted);
+    scale();
+    if (varied.has(field.name)) document.dispatchEvent(new Event("varied"));
+  };
   const newEnds = () => {
     const wanted = [Number(low.value), Number(high.value)];
-    if (wanted[0] < wanted[1]) ends.set(field.name, wanted);
-    scale();
+    if (wanted[0] < wanted[1]) bound(wanted);
+    else scale();
     show(value(field.name));
   };
   const show = (now) => {
     const [least, most] = ends.get(field.name);
     if (now !== null && (now < least || now > most)) { // a study between the ends has the value too
-      ends.set(field.name, [Math.min(now, least), Math.max(now, most)]);
-      scale();
+      bound([Math.min(now, least), Math.max(now, most)]);
     }
     if (document.activeElement !== box) box.value = now ?? "";
     slider.value = now ?? slider.min;

@@ -43,6 +43,7 @@ export function lights(named, view, answer, colour) {
     if (isOn) view.highlight("part", found, colour());
   });
   const hide = () => {
+    if (named.querySelector(":checked")) return; // what is chosen stays lit
     isOn = false;
     view.highlight("part", null);
   };
