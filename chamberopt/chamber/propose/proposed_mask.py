@@ -267,9 +267,9 @@ def _met_beside(
     design, chamber = proposal.design, proposal.chamber
     found, wholes = [], {}
     for one in named_or_all(others):
-        rows = rows_of(design, one.keys) & ~chamber.part.target
         inside, wholes[one.name] = met_area(design, chamber, one)
         if inside > min(MET * wholes[one.name], PARTLY_MET * target_area):
+            rows = rows_of(design, one.keys) & ~chamber.part.target
             found.append((one, inside, np.where(rows, chamber.exposed_area, 0.0)))
     if not found:
         return

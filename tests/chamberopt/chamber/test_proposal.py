@@ -177,16 +177,19 @@ def test_what_faces_away_is_offered_for_leaving_out(
     share = np.where(toes, 0.5, 1.0)
     monkeypatch.setattr("chamberopt.chamber.propose.proposal.touched", lambda *_: share)
     part = SimpleNamespace(target=Target(**target.keys), rotate_deg=(0.0, 0.0, 0.0))
-    posed = SimpleNamespace(triangles=mesh.triangles, target=target.triangles, area=area)
+    posed = SimpleNamespace(
+        vertices=mesh.vertices, triangles=mesh.triangles, target=target.triangles, area=area
+    )
     made = SimpleNamespace(
         mesh=mesh,
         known=known,
         design=SimpleNamespace(part=part, steps=None),
-        chamber=SimpleNamespace(part=posed),
+        chamber=SimpleNamespace(part=posed, steps=()),
         tables={"part": {"mesh": str(tmp_path / "gear.obj")}, "part.target": target.keys},
         reasons={},
     )
-    away, hidden = find_left_out(made)
+    away, hidden, sharp = find_left_out(made)
+    assert sharp.text.startswith("SHARP EDGES")
     assert away.text == "the 12% that face away from the sonotrode (face 7)"
     assert hidden.text == "the 3% that no ball touches here"
     text = design_text(made, tmp_path, [away, hidden])

@@ -6,7 +6,8 @@ class Round {
   static ALONG = 0.02; // of a facet's normal along the axis, sine
   static AWAY = 0.01; // of the radius, between a corner and the circle
   static SWEEP = Math.PI / 4; // least that a round surface turns
-  static FACETS = 6, CORNERS = 12; // least of a round surface, as any three points lie on a circle; of a round border
+  static FACETS = 6; // least of a round surface, as any three points lie on a circle
+  static CORNERS = 12; // least of a round border
   static OTHER = 0.005; // rad, between the normals of two facets
   static TRIED = 6; // facets beside the one that is met, each of which gives an axis
 
