@@ -4,10 +4,13 @@ Nothing on record is lost, the message says what happened, and the study can con
 """
 
 import errno
+import json
 import math
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -36,8 +39,6 @@ fork = (
     if "fork" in multiprocessing.get_all_start_methods()
     else None
 )
-# A fork of a worker of the tests, which has many threads, took that worker down now and then.
-spawn = multiprocessing.get_context("spawn")
 needs_fork = pytest.mark.skipif(fork is None, reason="needs fork")
 
 
@@ -157,33 +158,52 @@ def test_no_number_is_no_score(tmp_path: Path) -> None:
     assert run(study(), folder).trials == result.trials
 
 
+def study_whose_worker_dies(folder: Path, deaths: int) -> None:
+    """Run the study; real worker processes end without a word, each in a pool to be replaced."""
+    good, left = logged(folder.with_name(f"{folder.name}-calls.log")), [deaths]
+
+    def simulator(design, stream, replicas):
+        if len(calls(folder)) == 5 and left[0]:
+            left[0] -= 1
+            with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+                pool.submit(os._exit, 1).result()
+        return good(design, stream, replicas)
+
+    try:
+        run(study(), folder, simulator=simulator)
+    except BrokenExecutor as error:
+        print(*error.__notes__)
+
+
+def rows(text: bytes) -> list[object]:
+    """The rows of a history. The order of their keys is that of a process."""
+    return [json.loads(line) for line in text.splitlines()]
+
+
 class TestWorkerThatDies:
-    """A real worker process ends without a word, in a pool that must then be replaced."""
+    """The study runs in a process of its own: a worker of the tests has gone down with its pool."""
 
-    def simulator(self, folder: Path, deaths: list[int]):
-        good = logged(folder.with_name(f"{folder.name}-calls.log"))
-
-        def simulator(design, stream, replicas):
-            if len(calls(folder)) == 5 and deaths[0]:
-                deaths[0] -= 1
-                with ProcessPoolExecutor(1, spawn) as pool:
-                    pool.submit(os._exit, 1).result()
-            return good(design, stream, replicas)
-
-        return simulator
+    def said_of(self, folder: Path, deaths: int) -> str:
+        own = study_whose_worker_dies
+        call = f"{own.__name__}(Path({str(folder)!r}), {deaths})"
+        code = f"from pathlib import Path; from {own.__module__} import {own.__name__}; {call}"
+        root = Path(__file__).parents[3]
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=root, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
 
     def test_once_is_made_good(self, tmp_path: Path, expected: bytes) -> None:
-        run(study(), tmp_path / "out", simulator=self.simulator(tmp_path / "out", [1]))
-        assert history(tmp_path / "out") == expected
+        assert not self.said_of(tmp_path / "out", 1)
+        assert rows(history(tmp_path / "out")) == rows(expected)
 
     def test_twice_is_said(self, tmp_path: Path, expected: bytes) -> None:
         folder = tmp_path / "out"
-        with pytest.raises(BrokenExecutor) as raised:
-            run(study(), folder, simulator=self.simulator(folder, [2]))
-        assert "in evaluation 6 (search): chamber.height_mm" in raised.value.__notes__[0]
+        assert "in evaluation 6 (search): chamber.height_mm" in self.said_of(folder, 2)
         assert history(folder).count(b"\n") == 5
         run(study(), folder)
-        assert history(folder) == expected
+        assert rows(history(folder)) == rows(expected)
 
 
 STUDY = """
