@@ -220,7 +220,7 @@ LOOKED = """async () => {
 
 
 @pytest.mark.parametrize(
-    ("side", "opacity", "texts"), [("Bottom", 0.15, 2), ("Left", 0.9, 3), ("Isometric", 0.9, 4)]
+    ("side", "opacity", "texts"), [("Bottom", 0.08, 2), ("Left", 0.9, 3), ("Isometric", 0.9, 4)]
 )
 def test_what_is_seen_from_a_side(opened: Page, side: str, opacity: float, texts: int) -> None:
     """From below the part through the sonotrode; no dimension along the line of sight."""

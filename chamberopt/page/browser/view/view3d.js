@@ -3,7 +3,7 @@
 THREE.ColorManagement.enabled = false; // a colour on the screen is the one of the colour bar
 const TEXT_HEIGHT = 0.0115; // over its distance: 2.2 % of the view's height
 const OPACITY = { wall: 0.16, sonotrode: 0.9 }; // of the kinds that are seen through
-const FROM_BELOW = 0.15; // opacity of the sonotrode before the part
+const FROM_BELOW = 0.08; // opacity of the sonotrode before the part
 const WIDE = 0.7; // width over height of a view that shows all, also what is as wide as its diagonal
 const END_ON = 0.97; // cosine between sight and a dimension from which on it is not drawn
 class View3D {
