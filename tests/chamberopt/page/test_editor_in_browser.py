@@ -473,5 +473,6 @@ def test_nothing_foreign_is_asked_and_nothing_failed(opened: Page) -> None:
 def test_it_says_that_the_server_has_ended(opened: Page) -> None:
     opened.served.process.kill()
     opened.served.process.wait()
+    opened.tab("numbers")  # wherever the tests before it left the page
     opened.put("chamber.height_mm", 37)
     expect(opened.page.locator("#error")).to_contain_text("the server has ended", timeout=WAIT)
