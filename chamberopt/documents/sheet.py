@@ -334,8 +334,9 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
     """Yield rows on what holds the part, where it goes out, and what masks it."""
     holder = result.design.holder
     if holder is not None and holder.kind == "bore":
-        play = f"{plain(holder.clearance_mm)} mm of clearance all round"
-        play = play if holder.clearance_mm else "tight"
+        play = "tight"
+        if holder.clearance_mm:
+            play = f"{plain(holder.clearance_mm)} mm of clearance all round"
         yield "holder", f"the part itself, out through the wall, {play}"
     mask = result.design.mask
     if holder is None and not result.record.chamber.pieces_in_air:

@@ -80,6 +80,15 @@ class Faces:
         sums = [np.bincount(self.of_triangle, one, self.count) for one in vectors.T]
         return np.stack(sums, axis=1)
 
+    def are_flat(self, angle: float) -> np.ndarray:
+        """Return which faces (count,) are flat: those that bend have a shorter sum of area vectors.
+
+        Args:
+            angle: largest angle in a flat face [degrees].
+        """
+        length = np.linalg.norm(self.area_vectors, axis=1)
+        return np.asarray(length > np.cos(np.radians(angle)) * self.area)
+
     def alike(self, face: int) -> np.ndarray:
         """Return marks (count,) of the faces that are congruent with the face of number `face`.
 

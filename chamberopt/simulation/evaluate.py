@@ -307,17 +307,22 @@ def require_figures(design: Design, chamber: Chamber, mesh: TriangleMesh) -> Non
     require_touchable_zones(chamber, rooms_of(design, chamber, mesh), 0.5 * window.ball)
 
 
-def prepare_target(design: Design, chamber: Chamber, mesh: TriangleMesh) -> TargetField:
+def prepare_target(
+    design: Design, chamber: Chamber, mesh: TriangleMesh, name: str = "part.target"
+) -> TargetField:
     """Return the target of a chamber with windows, discs in which its coverage is measured.
 
-    Raises InputError if no triangle of the target bounds the cavity, no ball touches any of it, or
-    windows are too small.
+    Args:
+        name: what messages call the target.
+    Raises:
+        InputError: no triangle of the target bounds the cavity, no ball touches any of it, or
+            windows are too small.
     """
     window = window_setting(design, chamber)
     found = find_target_field(chamber, rooms_of(design, chamber, mesh), window)
     if not found.reachable > 0.0:
         raise InputError(
-            f"part.target: a ball of {1e3 * window.ball:g} mm touches nothing of it in this "
+            f"{name}: a ball of {1e3 * window.ball:g} mm touches nothing of it in this "
             "chamber, so it has no figures; let more of the part stand in the chamber, or use "
             "smaller balls"
         )
@@ -345,7 +350,9 @@ def zone_fields(design: Design, chamber: Chamber, mesh: TriangleMesh) -> dict[st
     Raises InputError if no triangle of a zone bounds the cavity, or the windows are too small.
     """
     surfaces = {name: chamber.on_zone(name) for name in chamber.part.zones}
-    return {name: prepare_target(design, one, mesh) for name, one in surfaces.items()}
+    return {
+        name: prepare_target(design, one, mesh, f"zones: {name}") for name, one in surfaces.items()
+    }
 
 
 def window_setting(design: Design, chamber: Chamber) -> WindowSetting:

@@ -261,8 +261,8 @@ class _Pilots:
                 if seeks:
                     made = as_no_wish(made)
         self.begin(FURTHER_STEP)
-        if asked is None:
-            made = made if found is None else with_expected_intensity(made, found.intensity)
+        if found is not None and asked is None:
+            made = with_expected_intensity(made, found.intensity)
         elif found is not None and found.intensity and made.predicted:
             # What one pilot tells of several sizes is compared; how strong one is, its own tells.
             scale = made.predicted.value / found.intensity.value

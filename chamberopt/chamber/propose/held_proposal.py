@@ -39,13 +39,13 @@ from chamberopt.chamber.propose.proposed_target import (
     apart,
     area_in_mm2,
     named_or_all,
+    nearest_axis,
 )
 from chamberopt.chamber.propose.shop import Shop
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import Progress
 from chamberopt.design.fixture import USUAL_SHELL_MM, WIDEST_GAP
 from chamberopt.geometry.faces import Faces
-from chamberopt.geometry.meshes.surface_error import format_point
 
 MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
 SEEN_OUT = 1e-3  # m by which a part stands out of a side
@@ -158,8 +158,9 @@ def _flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray)
         outside: area of each triangle that may be clamped [m²], (m,).
     """
     faces = Faces(vertices, triangles, FLAT_DEG)
-    flat = np.linalg.norm(faces.area_vectors, axis=1) > np.cos(np.radians(FLAT_DEG)) * faces.area
-    free = np.where(flat, np.bincount(faces.of_triangle, outside, faces.count), 0.0)
+    free = np.where(
+        faces.are_flat(FLAT_DEG), np.bincount(faces.of_triangle, outside, faces.count), 0.0
+    )
     largest = np.argsort(-free, kind="stable")[:MOST_FLAT]
     best, text = LEAST_JAW, ""
     for k, one in enumerate(largest):
@@ -174,18 +175,10 @@ def _flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray)
                 continue
             best = area
             text = "jaws on its flat faces that look to " + " and ".join(
-                f"{_way_in_words(way)} ({area_in_mm2(float(free[face]))} of it)"
+                f"{nearest_axis(way)} ({area_in_mm2(float(free[face]))} of it)"
                 for way, face in zip(ways, (one, other), strict=True)
             )
     return text
-
-
-def _way_in_words(way: np.ndarray) -> str:
-    """Return a direction (3,) in the chamber in words, as an axis where it is along one."""
-    k = int(np.abs(way).argmax())
-    if abs(way[k]) > np.cos(np.radians(FLAT_DEG)):
-        return f"{'-' if way[k] < 0.0 else '+'}{'xyz'[k]}"
-    return format_point(way)
 
 
 def hangs_by_a_face(made: Proposal) -> bool:

@@ -168,9 +168,9 @@ def _on_flat_faces(
     posed = mesh.vertices @ turn.T
     faces = mesh.faces(FLAT_DEG)
     sums = faces.area_vectors @ turn.T
-    # A face that bends has a sum of area vectors that is shorter than its area.
-    flat = np.linalg.norm(sums, axis=1) > math.cos(math.radians(FLAT_DEG)) * faces.area
-    usable = np.flatnonzero(flat & faces.free_of(target) & (sums[:, 2] > LEVEL * faces.area))
+    usable = np.flatnonzero(
+        faces.are_flat(FLAT_DEG) & faces.free_of(target) & (sums[:, 2] > LEVEL * faces.area)
+    )
     width = float(np.sort(np.ptp(posed, axis=0))[1])
     for face in usable[np.argsort(-faces.area[usable], kind="stable")][:MOST_FACES]:
         normal = np.round(sums[face] / np.linalg.norm(sums[face]), 4) + 0.0

@@ -54,8 +54,8 @@ PARTLY_MET = 0.05
 # Outer edges that turn by more [degrees] are sharp; the length of them that is told [m].
 SHARP, LEAST_EDGES = 45.0, 5e-3
 EDGES = (
-    " outer edges turn by more than 45 degrees in the file: break them before it is peened, as "
-    "dents roll a burr over them, or guard those that are thin (no source read)"
+    f" outer edges turn by more than {SHARP:g} degrees in the file: break them before it is "
+    "peened, as dents roll a burr over them, or guard those that are thin (no source read)"
 )
 MOVED_MM = 0.3  # of an opening, which is milled round the part with less play
 # Names of what fits to other parts, whose size and finish shot would change.
@@ -265,24 +265,20 @@ def _met_beside(
         target_area: area of the target [m²].
     """
     design, chamber = proposal.design, proposal.chamber
-    found, wholes = [], {}
+    found, wholes, words = [], {}, {}
     for one in named_or_all(others):
         inside, wholes[one.name] = met_area(design, chamber, one)
         if inside > min(MET * wholes[one.name], PARTLY_MET * target_area):
-            rows = rows_of(design, one.keys) & ~chamber.part.target
-            found.append((one, inside, np.where(rows, chamber.exposed_area, 0.0)))
+            rows, target = rows_of(design, one.keys), chamber.part.target
+            found.append((one, inside, np.where(rows & ~target, chamber.exposed_area, 0.0)))
+            words[one.name] = f"the rest of {one.name}" if np.any(rows & target) else one.name
     if not found:
         return
     met = [(one, inside, wholes[one.name]) for one, inside in apart(found)]
     met.sort(key=lambda one: (not RUNNING.search(one[0].name), one[1] <= MET * one[2]))
-    target = chamber.part.target
-
-    def named(one: Surface) -> str:
-        is_body = np.any(rows_of(design, one.keys) & target)
-        return f"the rest of {one.name}" if is_body else one.name
-
     names = [
-        f"{named(one)} ({area_in_mm2(inside)}{'' if inside > NEARLY_ALL * whole else ' of it'})"
+        f"{words[one.name]} ({area_in_mm2(inside)}"
+        f"{'' if inside > NEARLY_ALL * whole else ' of it'})"
         for one, inside, whole in met[:MOST_NAMED]
     ]
     more = f" and {len(met) - MOST_NAMED} more" if len(met) > MOST_NAMED else ""

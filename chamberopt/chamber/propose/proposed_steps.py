@@ -76,6 +76,7 @@ def propose_second_pose(
     if found is None or turns(made) or made.design.steps:
         return made, found
     is_hidden = not found.places and touched_share(made) < COVERED
+    longest = math.inf if is_hidden else WORTH * found.time_to_98
     if not is_hidden and found.time_to_98 < max(SLOW, UNEVEN * found.mean_time):
         return made, found
 
@@ -90,13 +91,12 @@ def propose_second_pose(
     if harm := new_harm(two, made):
         return dropped(harm)
     try:
-        after = measure(two, math.inf if is_hidden else WORTH * found.time_to_98)
+        after = measure(two, longest)
     except TooSlowError as error:
         return dropped(f"by a pilot {error} then, in one pose {found.in_words}")
     if after is None or not after.places:
         return dropped("no pilot resolved it")
-    enough = after.time_to_98 <= WORTH * found.time_to_98 or is_hidden
-    if not enough or (is_hidden and touched_share(two) < COVERED):
+    if after.time_to_98 > longest or (is_hidden and touched_share(two) < COVERED):
         return dropped(f"by a pilot {after.in_words} then, in one pose {found.in_words}")
     before = f"{touched_share(made):.0%} of the target is in reach" if is_hidden else found.in_words
     reason = (

@@ -390,8 +390,13 @@ def _way(normal: np.ndarray) -> str:
     """Return in words which axis of the part's file a normal (3,) is nearest to."""
     if not normal.any():
         return "all round"
-    axis = int(np.abs(normal).argmax())
-    return f"to {'-' if normal[axis] < 0.0 else '+'}{'xyz'[axis]}"
+    return f"to {nearest_axis(normal)}"
+
+
+def nearest_axis(way: np.ndarray) -> str:
+    """Return the axis that a direction (3,) is nearest to, as "+x"."""
+    axis = int(np.abs(way).argmax())
+    return f"{'-' if way[axis] < 0.0 else '+'}{'xyz'[axis]}"
 
 
 def _named(mesh: PartMesh, name: str, marked: np.ndarray) -> Surface:
