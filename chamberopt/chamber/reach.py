@@ -326,7 +326,7 @@ def find_touches(
     diameter: float,
     max_radius: float,
     normals: np.ndarray | None = None,
-    near: float | None = None,
+    chosen: np.ndarray | None = None,
 ) -> tuple[TouchPoints, float]:
     """Return the points to test on a cavity's surface, and the largest distance between them [m].
 
@@ -334,29 +334,15 @@ def find_touches(
         diameter: diameter of the smallest ball [m].
         max_radius: radius [m] up to which the largest ball at each point is found.
         normals: those of `find_reach`.
-        near: distance [m] from walls and sonotrode beyond which points of the part are left out;
-            None for all points.
+        chosen: marks the triangles whose points are wanted, (k,) bool; None for all.
     """
     if normals is None:
         normals = np.repeat(-unit_normals(mesh.corners)[:, None], 3, axis=1)
     radius = 0.5 * diameter
     spacing = _spacing(mesh, SPACING * radius)
     overlap = TOLERATED_OVERLAP * radius
-    chosen = None if near is None else _near_walls(mesh, near + 2.0 * float(spacing.max()))
     found = find_touch_points(mesh, normals, spacing, max_radius, overlap, chosen)
     return found, float(spacing.max())
-
-
-def _near_walls(mesh: TriangleMesh, distance: float) -> np.ndarray:
-    """Mark the triangles off the part, and those that may be nearer to them than a distance [m]."""
-    from sim_core import closest_points
-
-    chosen, part = mesh.tags != TAG_PART, np.flatnonzero(mesh.tags == TAG_PART)
-    middle = mesh.corners[part].mean(axis=1)
-    size = np.linalg.norm(mesh.corners[part] - middle[:, None], axis=2).max(axis=1)
-    for tag in np.unique(mesh.tags[chosen]):
-        chosen[part] |= closest_points(mesh, middle, distance + size, int(tag)).triangle >= 0
-    return np.asarray(chosen)
 
 
 def reached_part_share(reach: Reach, source: np.ndarray, count: int) -> np.ndarray:

@@ -28,6 +28,7 @@ from chamberopt.chamber.checks.place_names import surface_names
 from chamberopt.chamber.largest_ball import TouchPoints
 from chamberopt.chamber.reach import MEASURED_WIDTH, TOLERATED_OVERLAP, Reach, find_touches
 from chamberopt.chamber.scene import chamber_mesh
+from chamberopt.design.shape_surface import TAG_PART
 from chamberopt.geometry.triangles import connected_pieces
 
 if TYPE_CHECKING:
@@ -70,14 +71,15 @@ def find_gaps(chamber: Chamber, diameters: Sequence[float], beside_walls: bool =
     It is not found whether a ball gets there at all, for which `shot_reach` takes seconds.
 
     Args:
-        beside_walls: whether only gaps beside walls and sonotrode, and their mouths, are wanted,
-            not those of the part alone. The part is then measured near walls only.
+        beside_walls: whether only gaps beside walls and sonotrode are wanted, not those of the part
+            alone. They are measured from the walls: a ball between both faces touches both.
     """
-    normals = chamber.part.normals_in_cavity(chamber.vertices, chamber.triangles, chamber.source)
-    limit, largest = MEASURED_WIDTH * 0.5 * max(diameters), max(diameters)
-    # From the wall to a jammed ball, to a ball at the mouth of the gap, and to its face.
-    near = 0.5 * JAM_BAND[1] * largest + largest + limit if beside_walls else None
-    touches, spacing = find_touches(chamber_mesh(chamber), min(diameters), limit, normals, near)
+    limit, mesh = MEASURED_WIDTH * 0.5 * max(diameters), chamber_mesh(chamber)
+    part, normals = chamber.part, None
+    if not beside_walls:
+        normals = part.normals_in_cavity(chamber.vertices, chamber.triangles, chamber.source)
+    chosen = mesh.tags != TAG_PART if beside_walls else None
+    touches, spacing = find_touches(mesh, min(diameters), limit, normals, chosen)
     return _gaps(touches, None, spacing, min(diameters))
 
 

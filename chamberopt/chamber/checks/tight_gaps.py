@@ -49,7 +49,7 @@ def tight_gaps(chamber: Chamber, diameters: Sequence[float]) -> Iterator[TightGa
     for members in clusters(touches.centre[tight], 2.0 * gaps.spacing):
         gap = touches.select(tight[members])
         sides = sides_of_gap(gap, names)
-        small = gap.area.sum() < MIN_AREA * largest**2
+        small = 2.0 * gap.area.sum() < MIN_AREA * largest**2  # the wall is one of both faces
         if small or not {CEILING, SIDE_WALL, SONOTRODE}.intersection(sides):
             continue
         if np.isfinite(mouths.query(gap.centre, distance_upper_bound=near)[0]).any():
