@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -45,13 +46,17 @@ from chamberopt.chamber.propose.proposed_budget import (
 )
 from chamberopt.chamber.propose.proposed_floor import of_blocks
 from chamberopt.chamber.propose.proposed_intensity import LARGER
+from chamberopt.chamber.propose.proposed_mask import moved_openings
 from chamberopt.chamber.propose.proposed_setting import setting_of
 from chamberopt.chamber.propose.quicker import SLOW, turns
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain, rounded
+from chamberopt.geometry.triangles import rotation_matrix
 
 WORTH = 2.0 / 3.0  # of the time in one pose, in which a second set-up, often with its own wall, is
 RAISED = 1.0, 2.0, 3.0  # ball diameters by which a ceiling is raised for a second pose
+# Level axes about which a part may be turned over, and their angle to the chamber's x [degrees].
+OVER = {"x": 0.0, "y": 90.0, "the diagonal of x and y": 45.0, "the diagonal of x and -y": -45.0}
 # When two sizes pay, by heart: coarse balls serve MOSTLY of the target, their intensity is so many
 # times that of the finer ones, and these serve more of the target in less time. For fillets, where
 # parts fail, and for what coarse balls leave bare, they pay in any case.
@@ -99,9 +104,10 @@ def propose_second_pose(
     if after.time_to_98 > longest or (is_hidden and touched_share(two) < COVERED):
         return dropped(f"by a pilot {after.in_words} then, in one pose {found.in_words}")
     before = f"{touched_share(made):.0%} of the target is in reach" if is_hidden else found.in_words
+    over = two.reasons[".steps"].partition(",")[0]
     reason = (
-        f"turned over after half of the time: by pilots with balls of {setting_of(made).ball_mm:g} "
-        f"mm {after.in_words}, in one pose {before}"
+        f"{over}: by pilots with balls of {setting_of(made).ball_mm:g} mm {after.in_words}, in one "
+        f"pose {before}"
     )
     return replace(two, reasons={**two.reasons, ".steps": reason}), after
 
@@ -109,38 +115,62 @@ def propose_second_pose(
 def turned_over(made: Proposal) -> Proposal:
     """Return a proposal with a second step, turned over, under a ceiling that suits both poses.
 
+    It is turned about the first axis with which the walls have the same openings in both poses,
+    or else about the chamber's x.
+
     Raises InputError if what holds the part does not hold it then.
     """
-    try:
-        two = _turned_over(made)
-        for balls in RAISED:  # under a ceiling that fits one pose, balls may jam in the other
-            if "jam in" in new_harm(two, made):
-                two = min(two, _turned_over(made, balls), key=faults)
-    except InputError:
-        text = "what holds it in this pose does not hold it turned over"
-        raise InputError(text) from None
+    found: list[tuple[Proposal, str]] = []
+    for axis in OVER:
+        with suppress(InputError):
+            found.append((_turned_about(made, axis), axis))
+            if not moved_openings(found[-1][0].chamber):
+                break
+    if not found:
+        raise InputError("what holds it in this pose does not hold it turned over")
+    two, axis = min(
+        found, key=lambda one: (faults(one[0])[0], bool(moved_openings(one[0].chamber)))
+    )
     if any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air:
         raise InputError("nothing would hold it")
-    reason = "turned over after half of the time, as what looks up gets few dents"
-    return replace(two, reasons={**two.reasons, ".steps": reason})
+    over = f"turned over about {axis} after half of the time"
+    return replace(
+        two, reasons={**two.reasons, ".steps": f"{over}, as what looks up gets few dents"}
+    )
 
 
-def _turned_over(made: Proposal, raised: float = 0.0) -> Proposal:
+def _turned_about(made: Proposal, axis: str) -> Proposal:
+    """Return a proposal turned over about an axis of OVER, under a ceiling that suits both poses.
+
+    Raises InputError if the chamber cannot be built round the part in this pose.
+    """
+    two = _turned_over(made, axis)
+    for balls in RAISED:  # under a ceiling that fits one pose, balls may jam in the other
+        if "jam in" in new_harm(two, made):
+            two = min(two, _turned_over(made, axis, balls), key=faults)
+    return two
+
+
+def _turned_over(made: Proposal, axis: str, raised: float = 0.0) -> Proposal:
     """Return a proposal with a second step in which the part is turned over.
 
     Raises InputError if the chamber cannot be built round the part in this pose.
 
     Args:
+        axis: of OVER.
         raised: by how many diameters of a ball the ceiling is raised.
     """
     x, y, z = made.design.part.rotate_deg
     # Half a turn about the chamber's x after turns about x, y and z is one before them, with the
-    # turns about y and z the other way.
-    turned = [(x + 180.0) % 360.0, -y + 0.0, -z + 0.0]
+    # turns about y and z the other way. About an axis at an angle to x it is followed by a turn
+    # about the vertical by twice the angle.
+    angle = 2.0 * OVER[axis]
+    turned = [(x + 180.0) % 360.0, -y + 0.0, (angle - z + 180.0) % 360.0 - 180.0]
     pose: dict[str, list[float]] = {"rotate_deg": turned}
     if any(made.design.part.offset_mm):
-        along, across = made.design.part.offset_mm
-        pose["offset_mm"] = [along, -across]
+        over = rotation_matrix((180.0, 0.0, angle))[:2, :2]
+        offset = over @ made.design.part.offset_mm
+        pose["offset_mm"] = [round(float(one), 9) + 0.0 for one in offset]
     height = made.tables["chamber"]["height_mm"] + 1e3 * raised * made.design.shot.diameter
     two = _with_values(
         made,

@@ -128,24 +128,34 @@ def _harm(made: Proposal, first: Proposal) -> str:
 
 
 def _is_quicker(one: Way, other: Way) -> bool:
-    """Return whether a way is worth taking instead of another one.
+    """Return whether a way is worth taking instead of another one."""
+    if one.found is None or other.found is None or one.found.places < other.found.places:
+        return False
+    return not _objection(one, one.found, other, other.found)
+
+
+def _objection(one: Way, found: Measured, other: Way, of_other: Measured) -> str:
+    """Return in words why a way is not worth taking instead of another one; empty if it is.
 
     A way on twice as many sonotrodes, which have to vibrate alike, has to take half of the time. Up
     to SEVERAL do if it takes half of a time that nobody would run.
+
+    Args:
+        found, of_other: what pilots measured of them.
     """
-    if one.found is None or other.found is None or one.found.places < other.found.places:
-        return False
-    now, then = one.found.intensity, other.found.intensity
+    now, then = found.intensity, of_other.intensity
     if now is not None and then is not None and now.value < AS_STRONG * then.value:
-        return False
+        return "weaker"
     if (
-        other.found.time_to_98 > LONG
+        of_other.time_to_98 > LONG
         and one.made.sonotrode_count <= SEVERAL
-        and one.found.time_to_98 < HALF * other.found.time_to_98
+        and found.time_to_98 < HALF * of_other.time_to_98
     ):
-        return True
+        return ""
     ratio = max(one.made.sonotrode_count / other.made.sonotrode_count, 1.0)
-    return ratio * one.found.time_to_98 < QUICKER * other.found.time_to_98
+    if ratio * found.time_to_98 < QUICKER * of_other.time_to_98:
+        return ""
+    return "hardly quicker" if ratio == 1.0 else "not quick enough for more sonotrodes"
 
 
 def _said(found: Measured | None) -> str:
@@ -166,6 +176,10 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
     for one, harm in [(first, ""), *tried]:
         name = named(one)
         what = harm or _said(one.found)
+        if one is not best and one.found and best.found and one.found.places:
+            why = _objection(one, one.found, best, best.found)
+            if why and one.found.time_to_98 < best.found.time_to_98:
+                what += f" ({why})"
         count = one.made.sonotrode_count
         on, taken = f" on {count} sonotrodes" if count > 1 else "", " (taken)" * (one is best)
         texts.append(f"{name}{on}: {what}{taken}")

@@ -393,7 +393,7 @@ def test_where_a_quarter_is_too_thin_no_intensity_is_usual(tmp_path: Path, shop:
     trimesh.boolean.union([plate, sheet]).export(tmp_path / "step.stl")
     wanted = Wanted("mm", shop=shop, alloy="Ti-6Al-4V")
     made = propose(tmp_path / "step.stl", wanted, lambda known: [one.name for one in known])
-    with pytest.raises(InputError, match=r"much of the target is 1\.5 mm"):
+    with pytest.raises(InputError, match=r"a quarter of the target is 1\.5 mm"):
         usual_for(made)
     assert not is_off(made, PredictedIntensity(0.5, 0.05, 1.9, 2.5))
 
