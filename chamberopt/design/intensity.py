@@ -273,7 +273,7 @@ def why_none(alloy: Alloy, thickness: float) -> str:
     """Return in words why there is no usual range for an alloy of some thickness [m]."""
     if math.isfinite(thickness) and 1e3 * thickness < THIN_MM:
         return (
-            f"a quarter of the target is {plain(1e3 * thickness, 2)} mm thick or less, where {TABLE} "
-            f"has no range (below {THIN_MM:.2g} mm): agree on one with your customer"
+            f"a quarter of the target is {plain(1e3 * thickness, 2)} mm thick or less, where "
+            f"{TABLE} has no range (below {THIN_MM:.2g} mm): agree on one with your customer"
         )
     return f"{TABLE} has no range for {alloy.metal}: take that of your drawing"

@@ -5,7 +5,6 @@ Every number comes from a rule of thumb, with its reason beside it. A study then
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -53,7 +52,7 @@ from chamberopt.chamber.propose.proposed_arbor import (
     turning_bore,
     turning_pose,
 )
-from chamberopt.chamber.propose.proposed_balls import MANY, fit_sizes, propose_ball, sizes_to_try
+from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball, sizes_to_try
 from chamberopt.chamber.propose.proposed_end import (
     HeldEnd,
     bare_end,
@@ -342,12 +341,7 @@ def _proposed(
                 made, floor = other, its_floor
     made = padded(masked(made, floor, bores, wanted.shop), floor, target, wanted.shop)
     made = only_touched(made, floor, wanted.shop)
-    reasons = {**made.reasons, **_room_reason(made, floor)}
-    count, ball = made.design.shot.count, reasons["shot.diameter_mm"]
-    if count <= MANY:  # that many are under the whole part, not in this chamber
-        ball = re.sub("; MANY BALLS[^;]*", "", ball)
-    reasons["shot.diameter_mm"] = re.sub("some [0-9,]+ under the whole part", f"{count:,}", ball)
-    return replace(made, reasons=reasons)
+    return replace(made, reasons={**made.reasons, **_room_reason(made, floor)})
 
 
 def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:

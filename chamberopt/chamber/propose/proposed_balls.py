@@ -211,10 +211,6 @@ def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
     blunt = [one for one in fits if one.diameter > best.diameter]
     if blunt and blunt[0].fillets < best.fillets - MISSED_FILLETS:
         text += "; larger ones do not get into its fillets, where parts fail"
-    larger = [one for one in fits if one.diameter > best.diameter and one.count <= MANY]
-    if best.count > MANY and larger:
-        text += f"; MANY BALLS, some {best.count:,} under the whole part, to be dosed and sorted: "
-        text += f"{_mm(larger[0])} would serve {larger[0].served:.0%}"
     if best.jam:
         text += f"; BALLS JAM in gaps of {1e3 * best.jam:.4g} mm, as every size does"
     elif jammed := [one for one in fits if one.jam]:

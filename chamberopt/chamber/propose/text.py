@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import tomlkit
 
 from chamberopt.chamber.propose.proposal import Proposal
+from chamberopt.chamber.propose.proposed_balls import MANY
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.proposed_mask import LeftOut
 from chamberopt.chamber.propose.proposed_target import Surface
@@ -91,12 +92,24 @@ def to_settle(proposal: Proposal, left_out: Sequence[LeftOut]) -> list[str]:
 
     said = _clauses_of(proposal)
     found = [one for key in sorted(said, key=place) for one in said[key][1]]
+    found += _many_balls(proposal)
     for one in left_out:
         keys = " and ".join(f"part.target.{key}" for key in one.keys)
         many = "" if len(one.keys) > 1 else "s"
         leave = f": {keys} in the design leave{many} it out" if keys else ""
         found.append(f"{one_line(one.text)}{leave}")
     return list(dict.fromkeys(found))
+
+
+def _many_balls(proposal: Proposal) -> Iterator[str]:
+    """Yield that the balls are many, if they are, and which larger ones pilots compared."""
+    count, size = max(
+        (one.shot.count, one.shot.diameter) for one in proposal.design.in_steps.values()
+    )
+    if count > MANY:
+        fewer = (one for one in proposal.trials if 1e-3 * one.ball_mm > size and one.count < count)
+        larger = [f": {one.ball_mm:g} mm would serve {one.fit.served:.0%}" for one in fewer]
+        yield f"MANY BALLS, {count:,}, to be dosed and sorted{''.join(larger[:1])}"
 
 
 def design_text(proposal: Proposal, folder: Path, left_out: Sequence[LeftOut] = ()) -> str:

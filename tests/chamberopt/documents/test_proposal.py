@@ -39,6 +39,22 @@ def test_all_that_is_to_be_settled_is_one_list(made: Proposal) -> None:
     assert max(map(len, text.splitlines())) <= WIDTH
 
 
+def test_balls_that_are_many_are_told_with_what_pilots_say_of_larger_ones(made: Proposal) -> None:
+    ball = made.tables["shot"]["diameter_mm"]
+    assert not any("MANY" in one.mark for one in proposal_in_words(made, []).matters)
+    grams = 1e3 * made.design.shot.mass * 5200.4 / made.design.shot.count
+    many = replace(made, design=made.design.changed({"shot.mass_g": grams}))
+    fit = SizeFit(1e-3 * ball + 1e-3, 0.99, 0.83, True, 0.0, 100)
+    fewer = BallTrial(ball + 1.0, 40.0, 900, 1, fit, 95.0, True, None, "")
+    others = (replace(fewer, ball_mm=ball), replace(fewer, ball_mm=ball + 0.5, count=6000), fewer)
+    for trials, more in (((), ""), (others, f": {ball + 1:g} mm would serve 83%")):
+        matters = proposal_in_words(replace(many, trials=trials), []).matters
+        told = next(one.text for one in matters if one.mark == "MANY BALLS")
+        count = many.design.shot.count
+        assert count == pytest.approx(5200, rel=1e-3)
+        assert told == f", {count:,}, to be dosed and sorted{more}."
+
+
 def test_the_balls_that_pilots_compared_are_one_table(made: Proposal) -> None:
     """Each row has what is known of it: a time of places or on average, or why no pilot ran."""
     assert proposal_in_words(made, []).trials is None

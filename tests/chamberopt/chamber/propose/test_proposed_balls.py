@@ -98,12 +98,7 @@ def test_fewer_balls_are_proposed_where_they_serve_nearly_as_much() -> None:
     diameter, reason = propose_ball([small, *others])
     assert diameter == 1e-3
     assert "0.5 mm would serve 100%, but take 4 times as many" in reason
-    diameter, reason = propose_ball([small, others[1]])
-    assert diameter == 0.5e-3
-    assert (
-        "MANY BALLS, some 4,000 under the whole part, to be dosed and sorted: 2 mm would serve 60%"
-        in reason
-    )
+    assert propose_ball([small, others[1]])[0] == 0.5e-3
 
 
 def test_balls_get_into_the_fillets_of_the_target() -> None:
