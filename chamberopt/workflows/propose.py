@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import new_harm
@@ -30,6 +30,7 @@ from chamberopt.chamber.propose.proposed_intensity import (
     with_expected_intensity,
     with_prediction,
     with_thin_places,
+    with_time,
 )
 from chamberopt.chamber.propose.proposed_mask import LeftOut, find_left_out
 from chamberopt.chamber.propose.proposed_setting import Setting, setting_of, with_amplitude
@@ -207,6 +208,23 @@ def _written(first: Proposal, pilots: _Pilots, folder: Path) -> Proposed:
     return Proposed(made, left_out, list(studies))
 
 
+class _Sought(NamedTuple):
+    """What is sought for a part in a chosen pose.
+
+    Attributes:
+        wanted: the wishes that the pose and its sonotrodes follow from.
+        asked: the intensity that is sought; None if none is.
+        is_wish: somebody wished for it. Otherwise it is the usual one of a stated alloy, without
+            which a proposal may do.
+        reasons: which poses were tried, by dotted name.
+    """
+
+    wanted: Wanted
+    asked: WantedIntensity | None
+    is_wish: bool
+    reasons: dict[str, str]
+
+
 @dataclass(frozen=True)
 class _Pilots:
     """Pilot simulations of proposals for the part in a file."""
@@ -225,98 +243,106 @@ class _Pilots:
 
         Raises InputError if an intensity that was asked for cannot be told.
         """
-        quietly = partial(self._measure, is_told=False)
-        briefly = partial(quietly, is_brief=True)
-        self.begin(TIME)
-        way = Way(first, self.wishes.geometry, self._measure(first, is_brief=True))
-        self.begin(WAYS)
-        made, wanted, found = propose_quicker(way, self._again, briefly)
-        made, found = propose_second_pose(made, found, briefly)
-        wanted = replace(wanted, turned_over=bool(made.design.steps))
-        why_so = {key: made.reasons[key] for key in OF_POSES if key in made.reasons}
-        intensity, asked = self.wishes.intensity, self.wishes.asked_intensity()
-        # A stated alloy has a usual intensity, which a proposal should not miss.
-        seeks = bool(wanted.alloy and intensity is None and found and is_off(made, found.intensity))
-        if intensity == USUAL or seeks:
-            asked = usual_for(made)
-        by_geometry, scale = setting_of(made).ball_mm, 1.0
-        if asked:
+        now, wanted = self._chosen_way(first)
+        by_geometry = setting_of(now.made).ball_mm
+        sought = self._sought(now, wanted)
+        if sought.asked:
             self.begin(INTENSITY)
-            start = made
-            try:
-                made, found = self._for_intensity(start, wanted, asked, why_so)
-            except InputError:  # which is no reason to stop if nobody asked
-                if not seeks:
-                    raise
-                asked = None
-            else:  # with these balls it may be worth turning it over
-                over, _ = propose_second_pose(made, found, briefly)
-                if over.design.steps and not start.design.steps:
-                    why_so = {**why_so, ".steps": over.reasons[".steps"]}
-                    other = replace(wanted, turned_over=True)
-                    with suppress(InputError):
-                        start = turned_over(start)
-                        made, found = self._for_intensity(start, other, asked, why_so)
-                        wanted = other
-                if seeks:
-                    made = as_no_wish(made)
+            now, sought = self._with_intensity(now, sought, sought.asked)
         self.begin(FURTHER_STEP)
-        if found is not None and asked is None:
-            made = with_expected_intensity(made, found.intensity)
-        elif found is not None and found.intensity and made.predicted:
-            # What one pilot tells of several sizes is compared; how strong one is, its own tells.
-            scale = made.predicted.value / found.intensity.value
-            found = found._replace(intensity=made.predicted)
-        now = Compared(made, found)
-        further = (
-            self._compared(setting, now, wanted, asked, why_so, scale)
-            for setting in settings_beside(made, wanted, asked, found, by_geometry)
-        )
-        others = [one for one in further if one is not None]
-        if seeks and asked:
-            others = [one._replace(made=as_no_wish(one.made)) for one in others]
+        now, others = self._beside(now, sought, by_geometry)
         trials = of_ball_sizes([now, *others]) if others else ()
-        if asked:
+        if asked := sought.asked:
             enough = [one for one in others if gives(asked, one.found)]
             coarse = now if gives(asked, now.found) or not enough else enough[0]
-            two, why = with_finer_balls(coarse.made, coarse.found, by_geometry, quietly)
+            measure = partial(self._measure, is_told=False)
+            two, why = with_finer_balls(coarse.made, coarse.found, by_geometry, measure)
             if two is not None:
                 return replace(with_thin_places(two), trials=trials)
             now = larger_instead(now, others, trials, asked) or now
             now = now._replace(made=without_finer(now.made, why))
         found = now.found
         if found is not None and not found.settled:
-            found = quietly(now.made) or found
+            found = self._measure(now.made, is_told=False) or found
         if found is not None:
-            ball = setting_of(now.made).ball_mm  # of which one time is told
-            trials = tuple(
-                replace(one, time_to_98=found.time_to_98, is_of_places=found.places)
-                if one.ball_mm == ball
-                else one
-                for one in trials
-            )
+            trials = with_time(trials, setting_of(now.made).ball_mm, found)
         return replace(_in_budget(now.made, found), trials=trials)
 
-    def _for_intensity(
-        self, start: Proposal, wanted: Wanted, asked: WantedIntensity, why_so: dict[str, str]
-    ) -> tuple[Proposal, Measured | None]:
-        """Return a proposal for an intensity, and what a pilot measured of it.
+    def _chosen_way(self, first: Proposal) -> tuple[Compared, Wanted]:
+        """Return the pose, sonotrodes and charge that peen quickest, and the wishes for them."""
+        self.begin(TIME)
+        way = Way(first, self.wishes.geometry, self._measure(first, is_brief=True))
+        self.begin(WAYS)
+        made, wanted, found = propose_quicker(way, self._again, self._briefly)
+        now = Compared(*propose_second_pose(made, found, self._briefly))
+        return now, replace(wanted, turned_over=bool(now.made.design.steps))
+
+    def _sought(self, now: Compared, wanted: Wanted) -> _Sought:
+        """Return what is sought for the part as it stands in a proposal.
+
+        A stated alloy has a usual intensity, which a proposal should not miss.
+        """
+        made, found = now.made, now.found
+        reasons = {key: made.reasons[key] for key in OF_POSES if key in made.reasons}
+        intensity, asked = self.wishes.intensity, self.wishes.asked_intensity()
+        is_wish = intensity is not None or not wanted.alloy
+        if intensity == USUAL or (not is_wish and found and is_off(made, found.intensity)):
+            asked = usual_for(made)
+        return _Sought(wanted, asked, is_wish, reasons)
+
+    def _with_intensity(
+        self, start: Compared, sought: _Sought, asked: WantedIntensity
+    ) -> tuple[Compared, _Sought]:
+        """Return a proposal for an intensity, turned over where that is worth it with its balls.
+
+        Without a wish for it the start is returned, with nothing sought, where no pilot tells it.
+        """
+        try:
+            now = self._for_intensity(start.made, sought, asked)
+        except InputError:
+            if sought.is_wish:
+                raise
+            return start, sought._replace(asked=None)
+        over, _ = propose_second_pose(now.made, now.found, self._briefly)
+        if over.design.steps and not start.made.design.steps:
+            other = sought._replace(
+                wanted=replace(sought.wanted, turned_over=True),
+                reasons={**sought.reasons, ".steps": over.reasons[".steps"]},
+            )
+            with suppress(InputError):
+                now = self._for_intensity(turned_over(start.made), other, asked)
+                sought = other
+        return now, sought
+
+    def _for_intensity(self, start: Proposal, sought: _Sought, asked: WantedIntensity) -> Compared:
+        """Return a proposal for an intensity, and what a pilot measured of it."""
+        made = propose_intensity(start, sought.wanted, asked, self._again, self._predict)
+        made = _told(made, sought.reasons)
+        return Compared(made, self._measure(made, is_brief=True))
+
+    def _beside(
+        self, now: Compared, sought: _Sought, by_geometry: float
+    ) -> tuple[Compared, list[Compared]]:
+        """Return a proposal with its intensity told, and others with balls of other sizes.
 
         Args:
-            start: the proposal by geometry.
-            why_so: reasons to be kept, by dotted name.
+            by_geometry: diameter of the balls that geometry alone gave [mm].
         """
-        made = _told(propose_intensity(start, wanted, asked, self._again, self._predict), why_so)
-        return made, self._measure(made, is_brief=True)
+        made, found = now.made if sought.is_wish else as_no_wish(now.made), now.found
+        scale = 1.0
+        if found is not None and sought.asked is None:
+            made = with_expected_intensity(made, found.intensity)
+        elif found is not None and found.intensity and made.predicted:
+            # What one pilot tells of several sizes is compared; how strong one is, its own tells.
+            scale = made.predicted.value / found.intensity.value
+            found = found._replace(intensity=made.predicted)
+        now = Compared(made, found)
+        settings = settings_beside(made, sought.wanted, sought.asked, found, by_geometry)
+        tried = [self._compared(setting, now, sought, scale) for setting in settings]
+        return now, [one for one in tried if one is not None]
 
     def _compared(
-        self,
-        setting: Setting,
-        now: Compared,
-        wanted: Wanted,
-        asked: WantedIntensity | None,
-        why_so: dict[str, str],
-        scale: float,
+        self, setting: Setting, now: Compared, sought: _Sought, scale: float
     ) -> Compared | None:
         """Return a proposal with other balls and what a pilot measured of it.
 
@@ -324,23 +350,24 @@ class _Pilots:
 
         Args:
             now: the proposal that they are compared with.
-            asked: the intensity that is sought, if one is.
-            why_so: reasons to be kept, by dotted name.
             scale: factor on the intensity that the pilot tells.
         """
         try:
-            made = self._again(replace(wanted, ball_mm=setting.ball_mm))
+            made = self._again(replace(sought.wanted, ball_mm=setting.ball_mm))
         except InputError:
             return None
-        made = _told(with_amplitude(made, setting), why_so)
+        made = _told(with_amplitude(made, setting), sought.reasons)
         if harm := new_harm(made, now.made):
             return Compared(made, None, harm)
-        found = self._measure(made, is_told=False, is_brief=True)
+        found = self._briefly(made)
         if found is not None and found.intensity:
             found = found._replace(intensity=found.intensity.times(scale))
-        if asked and found and found.intensity:
-            made = with_prediction(made, asked, found.intensity)
-        return Compared(made, found)
+        if sought.asked and found and found.intensity:
+            made = with_prediction(made, sought.asked, found.intensity)
+        return Compared(made if sought.is_wish else as_no_wish(made), found)
+
+    def _briefly(self, made: Proposal, longest: float = math.inf) -> Measured | None:
+        return self._measure(made, longest, is_told=False, is_brief=True)
 
     def _again(self, other: Wanted) -> Proposal:
         with no_steps():  # those of the first proposal, again

@@ -236,6 +236,18 @@ def of_ball_sizes(all_of: Sequence[Compared]) -> tuple[BallTrial, ...]:
     )
 
 
+def with_time(
+    trials: Sequence[BallTrial], ball_mm: float, found: Measured
+) -> tuple[BallTrial, ...]:
+    """Return trials in which balls of one size have the time that their last pilot tells."""
+    return tuple(
+        replace(one, time_to_98=found.time_to_98, is_of_places=found.places)
+        if one.ball_mm == ball_mm
+        else one
+        for one in trials
+    )
+
+
 def larger_instead(
     now: Compared,
     others: Sequence[Compared],
