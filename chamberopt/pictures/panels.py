@@ -74,19 +74,22 @@ def part_panels(
         views: the direction to the eye that shows the chamber, and one or two directions that show
             the target from near.
     """
+    eye, near = views
+    return [chamber_panel(add, part, chamber, eye), *near_panels(add, target, part, near)]
+
+
+def chamber_panel(
+    add: Add, part: Surface, chamber: Surface, eye: np.ndarray, caption: str = "in the chamber"
+) -> Panel:
+    """Draw the part in its chamber, with dimensions, as a panel of a page."""
 
     def add_both(plotter: Any) -> None:
         add(plotter)
         add_chamber(plotter, chamber)
 
-    eye, near = views
     points = np.concatenate([part.points, chamber.points])
     view = render_view(add_both, eye, points, SIZE, BORDER_OF_CHAMBER)
-    dimensions = chamber_dimensions(chamber, eye, float(part.bounds[4]))
-    return [
-        Panel(view, "in the chamber", dimensions, points),
-        *near_panels(add, target, part, near),
-    ]
+    return Panel(view, caption, chamber_dimensions(chamber, eye, float(part.bounds[4])), points)
 
 
 def without_twin(panels: Sequence[Panel]) -> list[Panel]:

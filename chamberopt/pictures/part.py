@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from chamberopt.pictures.charts.colours import BLUE, KINDS
 from chamberopt.pictures.panels import (
     BORDER,
     SIZE,
+    chamber_panel,
     choose_views,
     near_panels,
     part_panels,
@@ -60,6 +62,7 @@ def draw_target(design: Design, chamber: Chamber, screenshot: Path) -> str:
     """Draw the part with its target, and mark triangles of the target that are out of reach.
 
     With steps, the part stands as in the first, and what is marked is out of reach in all of them.
+    Each further pose has a view in the chamber.
 
     Where the part is thin, further views show how soft it is.
 
@@ -106,6 +109,9 @@ def draw_part(
         softness: restitution of the part over that of a rigid one, shape (n,), where it is thin.
             A second row of views shows it on the target.
         is_held_outside: True if the part is clamped where it stands out of the chamber.
+
+    A chamber with steps has a view of each pose.
+
     Returns:
         None, or one line that says why there is no picture.
     Raises:
@@ -126,7 +132,9 @@ def render_part(job: dict[str, Any]) -> None:
     marked, missed, edges, softness = (
         job[name] for name in ("marked", "missed", "edges", "softness")
     )
+    poses = []
     if job["chamber"] is not None:
+        poses = _further_poses(job)
         job = job | {"chamber": cavity_surface(job["chamber"])}
     kinds = np.select([missed, marked], [MISSED, MARKED], PLAIN)
     part, shown = _coloured(job, kinds)
@@ -134,13 +142,27 @@ def render_part(job: dict[str, Any]) -> None:
     if job["chamber"] is not None:
         legend = [*body_meanings([job["chamber"]]), *legend]
     legend = legend if not len(edges) else [(FAULT, "what the message tells of")]
-    rows = [Row(job["title"], _panels(job, part, shown, COLOURS))]
+    panels = _panels(job, part, shown, COLOURS, [(one, *_coloured(one, kinds)) for one in poses])
+    rows = [Row(job["title"], panels)]
     if softness is not None:
         bands = np.where(marked | missed, 1 + np.searchsorted(BANDS, softness, "right"), PLAIN)
         part, shown = _coloured(job, bands, beyond=False)
         rows.append(Row(f"{job['title']}: {SOFTER}", _panels(job, part, shown, BAND_COLOURS)))
         legend += [BAND_COLOURS[k] for k in np.unique(bands) if k != PLAIN]
     write_page(job["picture"], rows, legend, remarks=[f"part as it stands: {size_text(part)}"])
+
+
+def _further_poses(job: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the job of each step of its chamber in which the part stands otherwise."""
+    chamber, found = job["chamber"], []
+    seen = [chamber.part.vertices]
+    for step in chamber.steps:
+        vertices = step.part.vertices
+        if not any(np.array_equal(vertices, one) for one in seen):
+            seen.append(vertices)
+            corners = vertices[step.part.triangles] * MM
+            found.append(job | {"chamber": cavity_surface(step), "corners": corners})
+    return found
 
 
 def _coloured(
@@ -183,17 +205,22 @@ def _panels(
     part: Surface,
     shown: list[tuple[Surface, np.ndarray]],
     colours: Mapping[int, tuple[str, str]],
+    poses: Sequence[tuple[dict[str, Any], Surface, list[tuple[Surface, np.ndarray]]]] = (),
 ) -> list[Panel]:
     """Return the views of a part whose triangles have colours by their kinds.
 
     Args:
         shown: surfaces to draw over one another, with the kind of each triangle.
         colours: colour and meaning of each kind.
+        poses: job, part and surfaces of each further pose. They take the place of the target's
+            second view.
     """
     edges = job["edges"]
     lines = pyvista().line_segments_from_points(edges.reshape(-1, 3)) if len(edges) else None
 
-    def add(plotter: Any) -> None:
+    def add(
+        plotter: Any, part: Surface = part, shown: list[tuple[Surface, np.ndarray]] = shown
+    ) -> None:
         for level, (surface, kind) in enumerate(shown):
             for k in np.unique(kind):
                 actor = plotter.add_mesh(
@@ -220,6 +247,14 @@ def _panels(
         near = near_views(seen_area(target, rest, eyes), eyes)
         return without_twin(near_panels(add, target, part, near))
     chamber = job["chamber"]
-    views = choose_views([(target, part)], [chamber])
-    whole, *of_target = part_panels(add, target, part, chamber, views)
-    return [whole, *without_twin(of_target)]
+    eye, near = choose_views([(target, part)], [chamber])
+    whole, *of_target = part_panels(add, target, part, chamber, (eye, near))
+    if not poses:
+        return [whole, *without_twin(of_target)]
+    others = [
+        chamber_panel(
+            partial(add, part=own, shown=of_pose), own, one["chamber"], eye, f"in pose {number}"
+        )
+        for number, (one, own, of_pose) in enumerate(poses, start=2)
+    ]
+    return [whole._replace(caption="in the chamber, pose 1"), *others, of_target[0]]

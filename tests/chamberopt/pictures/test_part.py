@@ -10,7 +10,16 @@ from matplotlib.image import imread
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import load_design
-from chamberopt.pictures.part import CLEAR, HELD, MARKED, PLAIN, _coloured, draw_part
+from chamberopt.pictures.part import (
+    CLEAR,
+    HELD,
+    MARKED,
+    PLAIN,
+    _coloured,
+    _further_poses,
+    draw_part,
+    draw_target,
+)
 from chamberopt.results.vtp_files import MM, cavity_surface
 from tests.helpers.opengl import needs_opengl
 
@@ -46,6 +55,25 @@ def test_what_is_held_outside_is_marked_above_the_ceiling_alone(is_held: bool) -
     assert above.any()
     assert ((outside == HELD) == (above & is_held)).all()
     assert HELD not in inside
+
+
+@needs_opengl
+def test_each_pose_of_a_part_has_a_view_in_the_chamber(tmp_path: Path) -> None:
+    """A third step in the first pose, with other balls, has none."""
+    poses: list[dict[str, object]] = [
+        {"name": "first"},
+        {"name": "turned", "part": {"rotate_deg": [0.0, 0.0, 90.0]}},
+        {"name": "finer", "shot": {"diameter_mm": 2.0}},
+    ]
+    design = load_design("designs/plate.toml").changed({"steps": poses})
+    chamber = build_chamber(design)
+    (other,) = _further_poses({"chamber": chamber})
+    corners = MM * chamber.part.vertices[chamber.part.triangles]
+    turned = np.stack([-corners[..., 1], corners[..., 0], corners[..., 2]], axis=2)
+    np.testing.assert_allclose(other["corners"], turned, atol=1e-9)
+    assert draw_target(design, chamber, tmp_path / "design.png") == (
+        f"picture in {tmp_path / 'design.png'}"
+    )
 
 
 def test_a_part_is_drawn_only_where_there_can_be_such_a_file(tmp_path: Path) -> None:
