@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from itertools import count, product
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from chamberopt.chamber.part import preview_part
-from chamberopt.chamber.propose.text import study_of_design
+from chamberopt.chamber.propose.text import GOALS, study_of_design
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import (
     INPUTS,
@@ -20,8 +22,9 @@ from chamberopt.common.files import (
     remove_file,
     write_text,
 )
-from chamberopt.common.key_words import inner_first, unit_of
+from chamberopt.common.key_words import AIMS, inner_first, unit_of
 from chamberopt.common.toml_fields import read_toml
+from chamberopt.coverage.metrics import OBJECTIVES, metric_problem
 from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
 from chamberopt.documents.answer import on_average
@@ -52,6 +55,7 @@ from chamberopt.printers.sheet_page import SHEET
 from chamberopt.results.compare.comparison import compare, differing_values
 from chamberopt.results.load import Result, load_result, load_start
 from chamberopt.search.study import load_study
+from chamberopt.search.study.parameters import Vary
 from chamberopt.search.study_folder import STUDY, is_finished, is_study_folder, read_inputs
 
 MOST_VALUES = 6  # by which results differ, in the line of each
@@ -251,6 +255,7 @@ class Acts:
             "chosen": {name: _chosen(design, name) for name in picked_surfaces(design)},
             "is_drawn": design.chamber.setup() is not None,
             "files": _files_beside(file.path),
+            "aims": [(name, AIMS[name]) for name in _aims(design)],
         }
 
     def study(self, asked: Any) -> dict[str, object]:
@@ -264,8 +269,10 @@ class Acts:
         bounds = {key: {"low": low, "high": high} for key, (low, high) in asked["vary"].items()}
         if not bounds:
             raise InputError("nothing varies: tick the numbers that the search may change")
+        if (aim := str(asked["aim"])) not in _aims(file.design):
+            raise InputError(f"{aim}: nothing that a search of this design can be after")
         start = {key: f"now {file.design.value(key):g}" for key in bounds}
-        asked_for = file.design, bounds, start, int(evaluations)
+        asked_for = file.design, bounds, start, int(evaluations), GOALS[aim]
         write_text(path, study_of_design(file.path.name, *asked_for))
         try:
             load_study(path)
@@ -474,12 +481,22 @@ def _named_designs(file: Path) -> list[str]:
     return [one for one in named if isinstance(one, str)]
 
 
-def _files_beside(design: Path) -> list[dict[str, str]]:
+def _aims(design: Design) -> list[str]:
+    """Return the objectives that a search of a design can be after, the usual one first."""
+    return [
+        name
+        for name in GOALS
+        if not any(metric_problem(design, term) for term in OBJECTIVES[name].terms)
+    ]
+
+
+def _files_beside(design: Path) -> list[dict[str, Any]]:
     """Return name, kind and words of each readable design or study file in a design's folder.
 
-    The words say what a study is after. The design itself comes first.
+    The words say what a study is after, and `asks` has its question as far as the page can ask it.
+    The design itself comes first.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for path in sorted(design.parent.glob("*.toml"), key=lambda one: (one != design, one.name)):
         with suppress(InputError):
             tables = read_toml(path, "design")[1]
@@ -487,5 +504,17 @@ def _files_beside(design: Path) -> list[dict[str, str]]:
                 words = "this design" if path == design else "another design"
                 kind = "study" if is_study(tables) else "design"
                 words = aim_in_words(tables) if kind == "study" else words
-                rows.append({"name": path.name, "kind": kind, "words": words})
+                row = {"name": path.name, "kind": kind, "words": words}
+                rows.append(row | ({"asks": _question(tables)} if kind == "study" else {}))
     return rows
+
+
+def _question(tables: Mapping[str, Any]) -> dict[str, object]:
+    """Return the aim of a study file, the ends of the numbers it varies, and its evaluations."""
+    ends: dict[str, tuple[float, float]] = {}
+    for name, one in tables.get("vary", {}).items():
+        with suppress(ValueError):  # a form that the page has no field for
+            varied = TypeAdapter(Vary).validate_python(one)
+            ends |= {} if varied.texts else {name: varied.bounds}
+    count = tables.get("optimizer", {}).get("evaluations")
+    return {"aim": tables.get("objective", {}).get("name"), "vary": ends, "evaluations": count}

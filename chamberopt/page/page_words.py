@@ -80,7 +80,7 @@ _TABLES = (
     "part|chamber|shot|sonotrode|sonotrodes|materials|effects|process|holder|mask|zones|"
     "tolerances|ranges"
 )
-_DOTTED = rf"(?:{_TABLES})(?:\.\w+)+"
+_DOTTED = rf"(?:vary\.)?(?:{_TABLES})(?:\.\w+)+"
 _GUIDE = r"docs/[\w/]+\.md(?:#[\w-]+)?"
 _COMMAND = "|".join(sorted(map(re.escape, COMMANDS), key=len, reverse=True))
 _KEY = re.compile(
@@ -117,7 +117,7 @@ def on_page(text: str, known: set[str] | None = None) -> Words:
             continue
         if found.lower().endswith(_FILES):
             continue
-        key = found.strip("[]").removeprefix("effects.")
+        key = found.strip("[]").removeprefix("vary.").removeprefix("effects.")
         words = COMMANDS.get(found) or OPTIONS.get(found[2:]) or KEYS.get(key) or inner_first(key)
         words = "guide" if found.startswith("docs/") else words
         made += [text[at : match.start()]] * (match.start() > at)

@@ -63,20 +63,16 @@ function numberRow(field) {
     slider.step = field.whole ? 1 : 10 ** Math.floor(Math.log10(span / 100)) || "any";
   };
   const bound = (wanted) => {
-    ends.set(field.name, wanted);
+    if (wanted[0] < wanted[1]) ends.set(field.name, wanted);
     scale();
     if (varied.has(field.name)) document.dispatchEvent(new Event("varied"));
-  };
-  const newEnds = () => {
-    const wanted = [Number(low.value), Number(high.value)];
-    if (wanted[0] < wanted[1]) bound(wanted);
-    else scale();
     show(value(field.name));
   };
   const show = (now) => {
     const [least, most] = ends.get(field.name);
     if (now !== null && (now < least || now > most)) { // a study between the ends has the value too
       bound([Math.min(now, least), Math.max(now, most)]);
+      return;
     }
     if (document.activeElement !== box) box.value = now ?? "";
     slider.value = now ?? slider.min;
@@ -89,7 +85,7 @@ function numberRow(field) {
     if (Number.isNaN(now)) say(`${field.in_full}: given ${box.value}, which is no number`);
     else change({ [field.name]: now });
   });
-  for (const end of [low, high]) end.addEventListener("change", newEnds);
+  for (const end of [low, high]) end.addEventListener("change", () => bound([Number(low.value), Number(high.value)]));
   const more = element("div", { className: "ends" }, low, "…", high), vary = [];
   if (field.varies && !field.fixed) {
     const tick = element("input", { type: "checkbox", checked: varied.has(field.name) });
@@ -106,8 +102,20 @@ function numberRow(field) {
   row.addEventListener("pointerenter", () => { more.hidden = false; });
   row.addEventListener("pointerleave", () => { more.hidden = !varied.has(field.name) && !row.contains(document.activeElement); });
   scale();
-  rows.set(field.name, { show, row });
+  rows.set(field.name, { show, row, bound });
   return row;
 }
 
 export function showValues() { for (const [name, { show }] of rows) show(value(name)); }
+
+// Let a search change these numbers, between these ends, and no others.
+export function varyOnly(asked) {
+  varied.clear();
+  for (const [name, wanted] of Object.entries(asked)) {
+    if (!state.fields.some((one) => one.name === name && one.varies && !one.fixed)) continue;
+    ends.set(name, wanted);
+    varied.add(name);
+  }
+  makeFields();
+}
+export const bound = (name, wanted) => rows.get(name).bound(wanted);

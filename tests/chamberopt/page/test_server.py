@@ -97,8 +97,13 @@ def test_a_report_cannot_use_the_server(served: Served) -> None:
         ("/study", {"name": "design.toml", "vary": {}, "evaluations": 3}, "exists"),
         (
             "/study",
-            {"name": "s.toml", "vary": {"chamber.height_mm": [40, 60]}, "evaluations": 3},
-            "vary",
+            {
+                "name": "s.toml",
+                "vary": {"chamber.height_mm": [40, 60]},
+                "evaluations": 3,
+                "aim": "p05_coverage",
+            },
+            "given [40, 60], but the design starts at 30",
         ),
         ("/shape", {"changes": {"shot.mass_g": "much"}}, "shot.mass_g: given 'much'"),
         ("/shape", {"changes": {"no.key": 1}}, "not changed on the page"),
