@@ -52,7 +52,7 @@ from chamberopt.page.study_answers import candidate_answer, candidates_answer, m
 from chamberopt.printers.html import section
 from chamberopt.printers.report_page import REPORT, parts_content, viewer
 from chamberopt.printers.sheet_page import SHEET
-from chamberopt.results.compare.comparison import compare, differing_values
+from chamberopt.results.compare.comparison import compare, differing_values, values_before
 from chamberopt.results.load import Result, load_result, load_start
 from chamberopt.search.study import load_study
 from chamberopt.search.study.parameters import Vary
@@ -62,10 +62,14 @@ MOST_VALUES = 6  # by which results differ, in the line of each
 DEEPEST = 4  # levels of folders below the design's folder that are searched for results
 
 
-def list_results(folder: Path) -> list[dict[str, object]]:
+def list_results(folder: Path, now: Design) -> list[dict[str, object]]:
     """List all results and studies below a folder, the newest first.
 
     Each has a line on its coverage, and on the numbers of its design by which the results differ.
+    The line `stale` says in what its design was another than the one on the page; "" for nothing.
+
+    Args:
+        now: the design on the page.
     """
     rows, results = [], {}
     for where in _result_folders(folder):
@@ -76,6 +80,7 @@ def list_results(folder: Path) -> list[dict[str, object]]:
             result = load_result(where)
             results[row["folder"]] = result
             row["text"] = on_average(result)
+            row["stale"] = _stale(result, now)
         except InputError as error:
             unfinished = row["is_study"] and not is_finished(where)
             row["text"] = "a study that has not finished" if unfinished else str(error)
@@ -107,12 +112,24 @@ def _differences(results: Sequence[Result]) -> list[str]:
     names = [name for name in found if "." in name and not name.startswith("process.accuracy.")]
     return [
         ", ".join(
-            f"{inner_first(name)} {f'{value_text(found[name][k])} {unit_of(name)}'.rstrip()}"
+            _value_in_words(name, found[name][k])
             for name in names[:MOST_VALUES]
             if found[name][k] is not None
         )
         for k in range(len(results))
     ]
+
+
+def _value_in_words(name: str, value: object) -> str:
+    return f"{inner_first(name)} {value_text(value)} {unit_of(name)}".rstrip()
+
+
+def _stale(result: Result, now: Design) -> str:
+    """Return a sentence on the numbers that a result was simulated with, if others are now."""
+    before = values_before(result, now)
+    texts = [_value_in_words(*one) for one in before.items()][:MOST_VALUES]
+    more = f" and {len(before) - MOST_VALUES} more" if len(before) > MOST_VALUES else ""
+    return f"Not of the design as it is now. It had: {', '.join(texts)}{more}." if texts else ""
 
 
 def shown(folders: Sequence[Path]) -> dict[str, object]:
@@ -383,8 +400,9 @@ class Acts:
                 "the command line, or begin again with --trust-shape"
             )
 
-    def results(self, _: object) -> list[dict[str, object]]:
-        return list_results(self._path.parent)
+    def results(self, asked: Any) -> list[dict[str, object]]:
+        now = self._file(asked).with_changes(asked["changes"])
+        return list_results(self._path.parent, now)
 
     def shown(self, asked: Any) -> dict[str, object]:
         return shown([self.inside(str(one)) for one in asked["folders"][:2]])

@@ -135,9 +135,8 @@ LOOKS_OF_FRONT = "front", "status"
 OF_DESIGN = (
     "read", "part", "surface", "fields", "structure", "step", "remove", "shape", "cavity", "reach",
     "faces", "pick", "save", "study", "start", "shown", "candidates", "candidate", "model",
-    "resume", "more", "duration",
+    "resume", "more", "duration", "results",
 )  # fmt: skip
-LOOKS_OF_DESIGN = ("results",)
 CLOSED = "no design is open here any more: reload the page"
 NONSENSE = (
     LookupError,
@@ -217,7 +216,6 @@ def make_app(front: Front, port: int) -> OnePerson:
         *(route(name, "POST", False) for name in OF_FRONT),
         *(route(name, "GET", False) for name in LOOKS_OF_FRONT),
         *(route(name, "POST", True) for name in OF_DESIGN),
-        *(route(name, "GET", True) for name in LOOKS_OF_DESIGN),
         Route("/files/{name:path}", file),
         Mount("/browser", StaticFiles(directory=BROWSER)),
     ]

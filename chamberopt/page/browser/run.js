@@ -83,9 +83,9 @@ export async function start(command, of) {
 export async function followToEnd(started) {
   const exit = await follow(started);
   tellDuration();
-  showResult(exit === 0 ? started.result : "");
+  tell("ended", exit === 0 ? started.result : "");
 }
-const showResult = (result) => document.dispatchEvent(new CustomEvent("ended", { detail: result }));
+const tell = (name, detail) => document.dispatchEvent(new CustomEvent(name, { detail }));
 
 // Folder of the study that runs now, or "".
 export const running = () => study;
@@ -98,7 +98,7 @@ function show({ command, result, steps, seconds, lines, exit }) {
   if (exit !== null && command.startsWith("chamberopt new ")) return; // of the front page
   const before = study;
   study = exit === null && isStudy(command) ? result : "";
-  if (study && study !== before) showStudy(study);
+  if (study && study !== before) tell("study", study);
   find("stop").disabled = exit !== null;
   isRunning = exit === null;
   allow();
@@ -117,11 +117,10 @@ function toResult(command, result, exit) {
     made.addEventListener("click", act);
     return made;
   };
-  return [...(exit === 0 ? [button("Show the result", () => showResult(result)), " "] : []),
-    ...(isStudy(command) ? [button("See its candidates", () => showStudy(result))] : [])];
+  return [...(exit === 0 ? [button("Show the result", () => tell("result", result)), " "] : []),
+    ...(isStudy(command) ? [button("See its candidates", () => tell("study", result))] : [])];
 }
 const isStudy = (command) => command.startsWith("chamberopt run ");
-const showStudy = (folder) => document.dispatchEvent(new CustomEvent("study", { detail: folder }));
 
 for (const button of document.querySelectorAll("[data-command]")) button.addEventListener("click", () => attempt(async () => {
   if (isUnsaved()) throw new Error("there are unsaved changes: commands use the saved file, so save or undo them first");

@@ -132,8 +132,8 @@ export const isUnsaved = () => Object.keys(state.changes).length > 0;
 
 const SAID = 4000, REFUSED = 20000; // ms that a message stays
 let fading = 0;
-// Text, or a message of the server: texts, and pairs of words with what they are in a file as a tip.
-export const onPage = (words) => [words].flat().map((one) => typeof one === "string" ? one
+// Text, or a message of the server: texts, and pairs of words with what they are in a file as a tip; or elements.
+export const onPage = (words) => [words].flat().map((one) => typeof one === "string" || one instanceof Node ? one
   : element("abbr", { textContent: one[0], title: one[1] }));
 // A warning as one line, which opens on a click.
 export const warning = (words) => element("details", { className: "warned" }, element("summary", {}, ...onPage(words)));
@@ -147,7 +147,7 @@ export function say(text, good = false) {
   box.className = good ? "good" : "";
   box.hidden = !text;
   clearTimeout(fading);
-  if (text) fading = setTimeout(hide, good ? SAID : REFUSED);
+  if (text) fading = setTimeout(hide, good && typeof text === "string" ? SAID : REFUSED);
 }
 
 // Run an act; what goes wrong is said on the page.

@@ -452,6 +452,18 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     opened.tab("run")
     page.locator("#progress").get_by_text("Show the result").click()
     expect(page.locator("#shown #part-0 canvas")).to_have_count(1, timeout=WAIT)
+    expect(page.locator("#stale")).to_be_empty()
+    row.get_by_text("make the report").click()
+    with page.expect_popup(timeout=WAIT) as report:
+        page.locator("#message").get_by_text("open it").click(timeout=WAIT)
+    assert report.value.url.endswith("/files/results/design/report.html")
+    report.value.close()
+    assert row.locator("input").is_checked()
+    page.locator('[id="shot.mass_g"]').evaluate("one => { one.value = 2.9; }")
+    page.locator('[id="shot.mass_g"]').dispatch_event("change")
+    expect(page.locator("#stale")).to_contain_text("It had: mass of the shot 3 g", timeout=WAIT)
+    page.click("#undo")
+    expect(page.locator("#stale")).to_be_empty(timeout=WAIT)
 
 
 @pytest.mark.long

@@ -31,7 +31,7 @@ def test_only_the_one_who_has_the_token_is_served(served: Served) -> None:
     assert served.get("/").status == 200
     for path in (
         "/",
-        "/results",
+        "/status",
         "/browser/editor.js",
         "/browser/view/view3d.js",
         "/files/design.png",
@@ -39,10 +39,10 @@ def test_only_the_one_who_has_the_token_is_served(served: Served) -> None:
         assert served.get(path, cookie="").status == 403
     assert served.get("/?token=guessed", cookie="").status == 403
     assert served.get("/", cookie=served.cookie + "x").status == 403
-    assert served.get("/results").status == 200
+    assert served.get("/status").status == 200
     for key in ("", "guessed"):  # a cookie alone, which other servers of this machine may see
         headers = {"x-chamberopt-key": key}
-        assert served.get("/results", **headers).status == 403
+        assert served.get("/status", **headers).status == 403
         assert (
             served._send("POST", "/read", "{}", {"origin": served.origin, **headers}).status == 403
         )

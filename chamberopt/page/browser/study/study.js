@@ -21,13 +21,14 @@ export function followStudy(of) {
   look();
 }
 
-export function closeStudy() {
+function closeStudy() {
   folder = "";
   clearTimeout(looking);
   find("study-view").hidden = true;
   show(null);
 }
 find("close-study").addEventListener("click", closeStudy);
+find("study-result").addEventListener("click", () => document.dispatchEvent(new CustomEvent("result", { detail: folder })));
 
 // Look at the study, draw what is new, and look again until it has ended.
 async function look() {
@@ -52,6 +53,7 @@ async function look() {
   const ours = running() === mine;
   find("study-stop").disabled = !ours;
   find("study-resume").disabled = Boolean(running()) || Boolean(data?.finished);
+  find("study-result").disabled = !data?.finished;
   find("study-more").disabled = Boolean(running()) || !data?.candidates.length;
   if (ours || (data && !data.finished)) looking = setTimeout(look, EVERY);
 }
