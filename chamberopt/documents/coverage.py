@@ -43,6 +43,9 @@ MAIN = (
 SHOWN_AS_TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # besides the objective
 
 
+TELLS_APART = "The time to 98 % there tells places apart."
+
+
 @dataclass(frozen=True)
 class Figure:
     """A figure of the result in its stored unit, its value for the start design and the change.
@@ -175,7 +178,11 @@ def coverage_section(
         for name, scene in scenes.items()
         if scene.coverage is not None
     }
-    if drawn:
+    is_flat = all(scene.is_saturated for scene in scenes.values())
+    if is_flat:
+        text = "All of it would be one bar of a histogram, from 95 to 100 %. "
+        content.append(Sentence(text + TELLS_APART, "soft"))
+    elif drawn:
         caption = (
             "How much of the target's area has which coverage at the end of the treatment, "
             "as the picture above shows it. Both are of single windows, where counted dents "

@@ -383,7 +383,7 @@ class Acts:
                 with suppress(InputError):
                     self._refuse_shape(path)
                     if inputs.is_of(load_study(path)):
-                        return row["name"]
+                        return str(row["name"])
         raise InputError(
             f"{folder.name}: no study file here asks what this study asked, so its file or design "
             "was changed since; restore it, or run the study anew"
