@@ -41,7 +41,11 @@ OPTIONS = {
     "calibration": "calibration of the machine",
     "no-pilot": "the choice not to simulate",
 }
-KEYS = {"holder.at": "faces of the holder", "mask.at": "faces of the mask"}
+KEYS = {
+    "holder.at": "faces of the holder",
+    "mask.at": "faces of the mask",
+    "optimizer.evaluations": "chambers to simulate",
+}
 # What the page has in the place of a command, or what the command is for where the page lacks it.
 COMMANDS = {
     "chamberopt simulate": "Simulate, in the tab Run",
@@ -78,7 +82,7 @@ TERMS = {
 }
 _TABLES = (
     "part|chamber|shot|sonotrode|sonotrodes|materials|effects|process|holder|mask|zones|"
-    "tolerances|ranges"
+    "tolerances|ranges|optimizer"
 )
 _DOTTED = rf"(?:vary\.)?(?:{_TABLES})(?:\.\w+)+"
 _GUIDE = r"docs/[\w/]+\.md(?:#[\w-]+)?"
@@ -87,6 +91,7 @@ _KEY = re.compile(
     rf"{_GUIDE}|(?:{_COMMAND})(?![\w-])|\[(?:{_TABLES})\]|\[{_DOTTED}\]|(?<![\w./]){_DOTTED}|--(?:{'|'.join(OPTIONS)})(?![\w-])"
 )
 _TERM = re.compile(rf"(?<![\w./])(?:{'|'.join(map(re.escape, TERMS))})(?![\w./])")
+_PLACE = re.compile(r"(?m)^\S*\.toml:\d+: ")  # of a line in a file, which the page does not show
 _FILES = (".toml", ".json", ".html", ".pdf", ".png", *SUFFIXES)  # "part.stl" is no key
 
 
@@ -103,7 +108,7 @@ def on_page(text: str, known: set[str] | None = None) -> Words:
     ['raise ', ('height of the chamber', 'chamber.height_mm')]
     """
     made: Words = []
-    at = 0
+    at, text = 0, _PLACE.sub("", text)
     known = set() if known is None else known
     for match in sorted((*_KEY.finditer(text), *_TERM.finditer(text)), key=lambda one: one.start()):
         found = match[0]
@@ -124,6 +129,18 @@ def on_page(text: str, known: set[str] | None = None) -> Words:
         made.append((words, found))
         at = match.end()
     return [*made, *[text[at:]] * (at < len(text))]
+
+
+_LINE = re.compile(r"(?m)^(?:.*\.toml:\d+: )?(?:vary\.)?([a-z][\w.]*): (.+)$")
+
+
+def at_keys(text: str) -> dict[str, Words]:
+    """Return what a message says of each key that one of its lines begins with, for the key's field.
+
+    >>> at_keys("a/design.toml:9: chamber.height_mm: given -5; allowed: from 2 mm")
+    {'chamber.height_mm': ['given -5; allowed: from 2 mm']}
+    """
+    return {key: on_page(said) for key, said in _LINE.findall(text)}
 
 
 _SAID = re.compile(r"(<(?:p|td|th|dt|dd|li|caption)\b[^>]*>)([^<]+)")

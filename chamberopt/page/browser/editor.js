@@ -1,5 +1,5 @@
 // The page: its tabs, what is asked of the server as the design changes, and what is said of it.
-import { makeFields, showValues } from "./fields.js";
+import { makeFields, sayAtFields, showValues } from "./fields.js";
 import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
@@ -69,11 +69,11 @@ async function followShape() {
     const changes = asked = state.shown;
     try {
       const answer = unpack(await ask("/shape", { changes, step: state.step }));
-      refuse("");
+      refuse(null);
       if (answer.state.length !== fillTarget.part.triangles.length / 3) await showPartOf(); // its file has changed
       showShape(answer);
       document.body.dataset.shape = String(Number(document.body.dataset.shape ?? 0) + 1);
-    } catch (error) { if (asked === state.shown) refuse(wordsOf(error)); }
+    } catch (error) { if (asked === state.shown) refuse(error); }
   }
   asking = false;
 }
@@ -104,17 +104,18 @@ function followCavity() {
     } catch (error) {
       if (mine !== round) return;
       if (error.superseded) timer = setTimeout(followCavity, AGAIN); // by another page of this design
-      else refuse(wordsOf(error));
+      else refuse(error);
     }
   }, QUIET);
 }
 
 function busy(text) { find("busy").textContent = text; }
 
-function refuse(text) {
-  if (text) busy("");
-  find("error").replaceChildren(...onPage(text));
-  find("error").hidden = !text;
+function refuse(error) {
+  if (error) busy("");
+  find("error").replaceChildren(...onPage(error ? wordsOf(error) : ""));
+  find("error").hidden = !error;
+  sayAtFields(error?.at);
 }
 
 // What is to be settled before the chamber is built, each until a click says that it is.

@@ -1,5 +1,5 @@
 // A slider and a field for every number of the design, grouped by its tables; the ends of sliders bound a study.
-import { attempt, change, element, endMove, onPage, original, restructure, say, state, value } from "./state.js";
+import { attempt, change, element, endMove, onPage, original, restructure, state, value } from "./state.js";
 
 const OPEN = ["chamber", "shot", "sonotrode"], POSE = ["part.rotate_deg", "part.offset_mm"];
 const rows = new Map();
@@ -38,8 +38,9 @@ function choiceRow(field) {
     if (!field.is_structure) change({ [field.name]: select.value });
     else attempt(() => restructure(field.name, select.value)).then(showValues); // as it was where it is refused
   });
-  rows.set(field.name, { show: (now) => { select.value = now; }, row: null });
-  return element("div", { className: "field" }, label(field), select);
+  const row = element("div", { className: "field" }, label(field), select);
+  rows.set(field.name, { show: (now) => { select.value = now; }, row });
+  return row;
 }
 
 // Ends that a slider begins with: half and one and a half times the value, within what the schema allows.
@@ -82,7 +83,7 @@ function numberRow(field) {
   slider.addEventListener("change", endMove);
   box.addEventListener("change", () => {
     const text = box.value.trim().replace(",", "."), now = text === "" ? null : Number(text);
-    if (Number.isNaN(now)) say(`${field.in_full}: given ${box.value}, which is no number`);
+    if (Number.isNaN(now)) sayAtFields({ [field.name]: `given ${box.value}, which is no number` });
     else change({ [field.name]: now });
   });
   for (const end of [low, high]) end.addEventListener("change", () => bound([Number(low.value), Number(high.value)]));
@@ -119,3 +120,13 @@ export function varyOnly(asked) {
   makeFields();
 }
 export const bound = (name, wanted) => rows.get(name).bound(wanted);
+
+// Say what is wrong at the fields of the keys that a message names; a pair of numbers at its first.
+export function sayAtFields(faults = {}) {
+  for (const old of document.querySelectorAll(".field > .wrong")) old.remove();
+  for (const [name, words] of Object.entries(faults)) {
+    const { row } = rows.get(name) ?? rows.get(`${name}.0`) ?? {};
+    row?.append(element("p", { className: "wrong", role: "alert" }, ...onPage(words)));
+    row?.closest("details")?.setAttribute("open", "");
+  }
+}

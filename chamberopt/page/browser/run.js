@@ -125,7 +125,7 @@ const isStudy = (command) => command.startsWith("chamberopt run ");
 for (const button of document.querySelectorAll("[data-command]")) button.addEventListener("click", () => attempt(async () => {
   if (isUnsaved()) throw new Error("there are unsaved changes: commands use the saved file, so save or undo them first");
   await followToEnd(await ask("/start", { command: button.dataset.command, of: find("of").value, points: find("points").value }));
-}));
+}, find("run-fault")));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
 // Write the study of the sliders, and run it.
 find("search-sliders").addEventListener("click", () => attempt(async () => {
@@ -137,4 +137,4 @@ find("search-sliders").addEventListener("click", () => attempt(async () => {
   allow();
   say(`written: ${study}`, true);
   await followToEnd(await ask("/start", { command: "run", of: study }));
-}));
+}, find("search-fault")));

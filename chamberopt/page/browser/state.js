@@ -21,7 +21,7 @@ export async function ask(path, question) {
   if (isBytes) return answer.arrayBuffer();
   if (answer.status === 403) throw new Error(await answer.text());
   const told = await answer.json().catch(() => ({ error: `the server failed at this (${answer.status})` }));
-  if (told.superseded || told.error) throw Object.assign(new Error(told.error), { superseded: Boolean(told.superseded), words: told.words });
+  if (told.superseded || told.error) throw Object.assign(new Error(told.error), { superseded: Boolean(told.superseded), words: told.words, at: told.at });
   return told;
 }
 
@@ -150,9 +150,10 @@ export function say(text, good = false) {
   if (text) fading = setTimeout(hide, good && typeof text === "string" ? SAID : REFUSED);
 }
 
-// Run an act; what goes wrong is said on the page.
-export async function attempt(act) {
-  try { say(""); return await act(); } catch (error) { say(wordsOf(error)); return undefined; }
+// Run an act; what goes wrong is said in an element beside its button, or over the page.
+export async function attempt(act, place = null) {
+  const tell = (words) => { if (place) place.replaceChildren(...onPage(words)); else say(words); };
+  try { say(""); tell(""); return await act(); } catch (error) { tell(wordsOf(error)); return undefined; }
 }
 
 export function element(tag, properties = {}, ...inner) {

@@ -367,6 +367,8 @@ def test_what_is_refused_is_said_and_the_newest_counts(opened: Page) -> None:
     expect(opened.page.locator("#error")).to_contain_text("not below height of the chamber = 4")
     key = opened.page.locator("#error abbr", has_text="height of the chamber").first
     assert key.get_attribute("title") == "chamber.height_mm"
+    row = opened.page.locator('.field:has([id="chamber.sonotrode_distance_mm"])')
+    expect(row.locator(".wrong")).to_contain_text("not below height of the chamber = 4")
     opened.page.click("#save")
     expect(opened.page.locator("#message")).to_contain_text("sonotrode distance of the chamber")
     assert "height_mm = 36" in (opened.served.folder / "design.toml").read_text()
