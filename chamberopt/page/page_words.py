@@ -135,7 +135,7 @@ _LINE = re.compile(r"(?m)^(?:.*\.toml:\d+: )?(?:vary\.)?([a-z][\w.]*): (.+)$")
 
 
 def at_keys(text: str) -> dict[str, Words]:
-    """Return what a message says of each key that one of its lines begins with, for the key's field.
+    """Return what a message says of each key with which one of its lines begins.
 
     >>> at_keys("a/design.toml:9: chamber.height_mm: given -5; allowed: from 2 mm")
     {'chamber.height_mm': ['given -5; allowed: from 2 mm']}

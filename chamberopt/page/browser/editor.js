@@ -4,7 +4,7 @@ import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import "./study/study.js";
-import { addStep, ask, attempt, change, element, isUnsaved, listen, onPage, read, removeStep, say, showAdded, showStep, state, takeTold, undo, unpack, value, warning, wordsOf } from "./state.js";
+import { addStep, ask, attempt, change, element, isUnsaved, listen, onPage, read, redo, removeStep, say, showAdded, showStep, state, takeTold, undo, unpack, value, warning, wordsOf } from "./state.js";
 import { lookAnew, setHandles, showCavity, showPart, showShape, showState } from "./scene.js";
 
 const find = (id) => document.getElementById(id);
@@ -171,12 +171,19 @@ listen((what) => {
   find("unsaved").textContent = state.showing || (isUnsaved() ? "not saved yet" : "");
   find("save").disabled = !isUnsaved();
   find("undo").disabled = !state.past.length;
+  find("redo").disabled = !state.undone.length;
   followShape();
   followCavity();
 });
 addEventListener("beforeunload", (event) => { if (isUnsaved()) event.preventDefault(); });
 
 find("undo").addEventListener("click", undo);
+find("redo").addEventListener("click", redo);
+addEventListener("keydown", (event) => { // in a field the keys undo what is typed there
+  if (!(event.ctrlKey || event.metaKey) || event.target.matches("input:not([type=range]), select")) return;
+  const act = { z: event.shiftKey ? redo : undo, y: redo }[event.key.toLowerCase()];
+  if (act) { event.preventDefault(); act(); }
+});
 find("front").addEventListener("click", () => attempt(async () => {
   if (isUnsaved() && !confirm("Go to the parts of this folder? What is not saved is lost.")) return;
   state.changes = {};

@@ -1,7 +1,7 @@
 // What the page knows: the file as read, changes not yet saved, and questions to the server.
 
 const listeners = [];
-export const state = { file: null, fields: [], surfaces: {}, steps: [], step: 0, changes: {}, past: [], shown: {}, showing: "" };
+export const state = { file: null, fields: [], surfaces: {}, steps: [], step: 0, changes: {}, past: [], undone: [], shown: {}, showing: "" };
 export const listen = (hear) => listeners.push(hear);
 const tell = (what) => { for (const hear of listeners) hear(what); };
 
@@ -41,8 +41,7 @@ export async function read(path = "/read", question = {}, before = () => {}) {
   state.file = await ask(path, question);
   takeTold(state.file);
   await before();
-  state.changes = {};
-  state.past = [];
+  Object.assign(state, { changes: {}, past: [], undone: [] });
   showChanges();
   tell("read");
 }
@@ -69,7 +68,7 @@ export const value = (name) => name in state.changes ? state.changes[name] : ori
 export function change(values, move = "") {
   say("");
   if (!move || state.move !== move) state.past.push(state.changes);
-  state.move = move;
+  Object.assign(state, { move, undone: [] });
   state.changes = { ...state.changes, ...values };
   for (const name of Object.keys(values))
     if (inFile(name).some((one) => one.name === name) && state.changes[name] === original(name)) delete state.changes[name];
@@ -103,18 +102,20 @@ async function changeBy(path, asked) {
   if (state.changes !== before) return; // something else was changed meanwhile
   say("");
   state.past.push(before);
-  Object.assign(state, { changes: made, move: "" });
+  Object.assign(state, { changes: made, move: "", undone: [] });
   showChanges();
   tell("changed");
 }
 
 export function endMove() { state.move = ""; }
 
-export function undo() {
-  if (!state.past.length) return;
+// Go back to the changes before the last one, or on to those that were undone.
+export const undo = () => goTo(state.past, state.undone), redo = () => goTo(state.undone, state.past);
+function goTo(from, to) {
+  if (!from.length) return;
   say("");
-  state.changes = state.past.pop();
-  state.move = "";
+  to.push(state.changes);
+  Object.assign(state, { changes: from.pop(), move: "" });
   showChanges();
   tell("changed");
 }

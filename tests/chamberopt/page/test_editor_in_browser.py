@@ -291,8 +291,17 @@ def test_a_slider_moves_and_is_undone_as_one(opened: Page) -> None:
     opened.page.click("#undo")
     assert float(opened.page.locator('[id="shot.mass_g"]').input_value()) > 3
     opened.page.click("#undo")
-    assert float(opened.page.locator('[id="shot.mass_g"]').input_value()) == 3
+    mass = opened.page.locator('[id="shot.mass_g"]')
+    assert float(mass.input_value()) == 3
     assert opened.page.locator("#undo").is_disabled()
+    opened.page.click("#redo")
+    assert float(mass.input_value()) > 3
+    opened.page.click("#redo")
+    assert float(mass.input_value()) == 7
+    assert opened.page.locator("#redo").is_disabled()
+    opened.page.keyboard.press("Control+z")
+    opened.page.keyboard.press("Control+z")
+    assert float(mass.input_value()) == 3
 
 
 def test_shape_and_holder_are_chosen_in_words(opened: Page) -> None:
