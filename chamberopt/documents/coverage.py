@@ -40,7 +40,6 @@ MAIN = (
     "strength_um",
     "mean_normal_speed_m_s",
 )
-SHOWN_AS_TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # besides the objective
 
 
 TELLS_APART = "The time to 98 % there tells places apart."
@@ -138,7 +137,6 @@ def main_figures(shown: Sequence[Figure]) -> list[Figure]:
 
 def tiles(shown: Sequence[Figure]) -> Tiles:
     """Return the objective and the main metrics as tiles: large numbers at the head of a report."""
-    chosen = [shown[0], *(one for one in shown[1:] if one.name in SHOWN_AS_TILES)]
     return Tiles(
         [
             Tile(
@@ -146,7 +144,7 @@ def tiles(shown: Sequence[Figure]) -> Tiles:
                 one.label.format(one.result),
                 one.label.format(one.start) if one.start is not None else "",
             )
-            for one in chosen
+            for one in main_figures(shown)
         ]
     )
 
