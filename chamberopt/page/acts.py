@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from itertools import count, product
@@ -19,6 +20,8 @@ from chamberopt.common.files import (
     RESULT,
     check_new_file,
     is_new_or_empty,
+    private_folder,
+    read_file,
     remove_file,
     write_text,
 )
@@ -57,6 +60,7 @@ from chamberopt.results.load import Result, load_result, load_start
 from chamberopt.search.study import load_study
 from chamberopt.search.study.parameters import Vary
 from chamberopt.search.study_folder import STUDY, is_finished, is_study_folder, read_inputs
+from chamberopt.workflows.comparison_folder import draw_differences
 
 MOST_VALUES = 6  # by which results differ, in the line of each
 DEEPEST = 4  # levels of folders below the design's folder that are searched for results
@@ -145,6 +149,19 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
         result = load_result(folders[0])
         first = answer_section(result, load_start(result))
     return {"content": content, "html": explained(section(first, viewer) + html)}
+
+
+def difference(folders: Sequence[Path]) -> dict[str, str]:
+    """Return the picture of where a later result covers more or less than the first, or why not.
+
+    Raises:
+        InputError: a folder has no usable result, or the results cannot be compared.
+    """
+    with private_folder() as place:
+        picture = Path(place, "difference.png")
+        if why := draw_differences(picture, compare(folders)):
+            return {"why": why}
+        return {"picture": f"data:image/png;base64,{b64encode(read_file(picture)).decode()}"}
 
 
 MOST_FILES = 20  # versions of the design's text that are kept for the pages that read them
@@ -406,6 +423,9 @@ class Acts:
 
     def shown(self, asked: Any) -> dict[str, object]:
         return shown([self.inside(str(one)) for one in asked["folders"][:2]])
+
+    def difference(self, asked: Any) -> dict[str, str]:
+        return difference([self.inside(str(one)) for one in asked["folders"][:2]])
 
     def inside(self, name: str) -> Path:
         """Return the path of a name in the design's folder.

@@ -135,7 +135,7 @@ LOOKS_OF_FRONT = "front", "status"
 OF_DESIGN = (
     "read", "part", "surface", "fields", "structure", "step", "remove", "shape", "cavity", "reach",
     "faces", "pick", "save", "study", "start", "shown", "candidates", "candidate", "model",
-    "resume", "more", "duration", "results",
+    "resume", "more", "duration", "results", "difference",
 )  # fmt: skip
 CLOSED = "no design is open here any more: reload the page"
 NONSENSE = (

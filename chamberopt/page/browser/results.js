@@ -54,6 +54,15 @@ async function show() {
   find("shown").hidden = find("close-results").hidden = false;
   views = showParts(content);
   await refresh();
+  if (folders.length > 1) await showDifference(folders);
+}
+
+// Where the second result covers more or less than the first, as the command compare draws it.
+async function showDifference(folders) {
+  const place = element("section", { id: "difference" }, element("h2", { textContent: "Difference of coverage" }), "drawing where they differ …");
+  find("shown").querySelector("section").after(place);
+  const { picture, why } = await ask("/difference", { folders }).catch(({ message }) => ({ why: message }));
+  place.lastChild.replaceWith(picture ? element("img", { src: picture, alt: "the part with the difference of coverage at each place" }) : why);
 }
 
 let views = [];
