@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from chamberopt.results.records import ModelRecord, StudyRecord
     from chamberopt.search.trial_log import Trial
 
+ALGORITHMS = {"sobol": "spread evenly", "surrogate": "chosen by a model of those before"}
 NO_CONSTRAINTS = "There were no constraints."
 
 
@@ -70,7 +71,7 @@ def question_section(result: Result) -> Section:
     text = (
         f"Which chamber gives the {aim} {label.in_full}? "
         f"The part is {part}; its target{reach} is peened {peening}. "
-        f"{study.evaluations} candidates were tried, chosen by: {study.algorithm}."
+        f"{study.evaluations} candidates were tried, {_chosen_by(study.algorithm)}."
     )
     constraints = _constraints(result)
     limits = f"Constraints: {', '.join(constraints)}." if constraints else NO_CONSTRAINTS
@@ -85,6 +86,11 @@ def question_section(result: Result) -> Section:
     ]
     table = Table("What was varied", ("parameter", "bounds", "start", "best"), varied)
     return Section("The question", [Beside([[Sentence(text), Sentence(limits)], [table]])])
+
+
+def _chosen_by(phases: str) -> str:
+    """Return in words how a search chose its candidates, by the names of its phases."""
+    return ", then ".join(ALGORITHMS.get(one, f"by {one}") for one in phases.split(", then "))
 
 
 def aim_in_words(tables: Mapping[str, Any]) -> str:

@@ -41,7 +41,7 @@ from chamberopt.page.checker import Checker
 from chamberopt.page.duration import duration_in_words
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
-from chamberopt.page.page_words import amplitudes_named, balls_named, explained, on_page
+from chamberopt.page.page_words import CHOICES, amplitudes_named, balls_named, explained, on_page
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
 from chamberopt.page.structure import (
@@ -125,7 +125,8 @@ def _differences(results: Sequence[Result]) -> list[str]:
 
 
 def _value_in_words(name: str, value: object) -> str:
-    return f"{inner_first(name)} {value_text(value)} {unit_of(name)}".rstrip()
+    text = CHOICES.get(str(value)) or value_text(value)
+    return f"{inner_first(name)} {text} {unit_of(name)}".rstrip()
 
 
 def _stale(result: Result, now: Design) -> str:

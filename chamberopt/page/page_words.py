@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from html import escape
 
-from chamberopt.common.key_words import inner_first
+from chamberopt.common.key_words import KINDS, inner_first
 from chamberopt.geometry.meshes.formats import SUFFIXES
 
 Words = list[str | tuple[str, str]]
@@ -17,15 +17,7 @@ Words = list[str | tuple[str, str]]
 CHOICES = {
     "conformal": "conformal: follows the part",
     "": "none: the part hangs in the air",
-    "rod": "rod on a face",
-    "collar": "collar round an end or a shaft",
-    "plate": "plate on a face or round a root",
-    "arbor": "arbor: a shaft through a hole",
-    "bore": "the part itself, out through the wall",
-    "shell": "shell on the faces",
-    "plugs": "plugs that fill holes",
-    "block": "block on the faces, up to the wall",
-    "random_phase": "random phase",
+    **KINDS,
 }
 OPTIONS = {
     "target": "what is peened",
@@ -45,6 +37,9 @@ KEYS = {
     "holder.at": "faces of the holder",
     "mask.at": "faces of the mask",
     "optimizer.evaluations": "chambers to simulate",
+    "objective_half_width": "half-width of the objective",
+    "tensile_MPa": "tensile strength",
+    "tungsten_carbide": "tungsten carbide",
 }
 # What the page has in the place of a command, or what the command is for where the page lacks it.
 COMMANDS = {
@@ -86,9 +81,10 @@ _TABLES = (
 )
 _DOTTED = rf"(?:vary\.)?(?:{_TABLES})(?:\.\w+)+"
 _GUIDE = r"docs/[\w/]+\.md(?:#[\w-]+)?"
+_BARE = "|".join(key for key in KEYS if "." not in key)
 _COMMAND = "|".join(sorted(map(re.escape, COMMANDS), key=len, reverse=True))
 _KEY = re.compile(
-    rf"{_GUIDE}|(?:{_COMMAND})(?![\w-])|\[(?:{_TABLES})\]|\[{_DOTTED}\]|(?<![\w./]){_DOTTED}|--(?:{'|'.join(OPTIONS)})(?![\w-])"
+    rf"{_GUIDE}|(?:{_COMMAND})(?![\w-])|\[(?:{_TABLES})\]|\[{_DOTTED}\]|(?<![\w./])(?:{_DOTTED}|(?:{_BARE})\b)|--(?:{'|'.join(OPTIONS)})(?![\w-])"
 )
 _TERM = re.compile(rf"(?<![\w./])(?:{'|'.join(map(re.escape, TERMS))})(?![\w./])")
 _PLACE = re.compile(r"(?m)^\S*\.toml:\d+: ")  # of a line in a file, which the page does not show
@@ -182,4 +178,4 @@ def amplitudes_named(text: str) -> list[float]:
 
 def choices(allowed: tuple[str, ...] | list[str]) -> list[tuple[str, str]]:
     """Return each allowed text with its words on the page."""
-    return [(one, CHOICES.get(one, one)) for one in allowed]
+    return [(one, CHOICES.get(one, one.replace("_", " "))) for one in allowed]
