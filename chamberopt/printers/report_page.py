@@ -75,10 +75,15 @@ def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Pa
     path = require_free_page(loaded.folder / REPORT if path is None else path)
     with claim_file(path):
         document = report(loaded)
+        sections = {f"section-{k}": one for k, one in enumerate(document.sections, 1)}
+        links = " ".join(
+            f'<a href="#{name}">{html.text(one.title)}</a>' for name, one in sections.items()
+        )
         body = (
             f"<header><h1>{html.text(document.name)}</h1>"
-            f"{html.paragraph(document.subtitle, 'soft')}</header>"
-            f"{''.join(html.section(one, viewer) for one in document.sections)}"
+            f"{html.paragraph(document.subtitle, 'soft')}"
+            f'<nav class="contents" aria-label="Contents">{links}</nav></header>'
+            f"{''.join(html.section(one, viewer, name) for name, one in sections.items())}"
         )
         write_page(path, f"{document.name}: report", body, document.scenes)
     return path, document

@@ -80,6 +80,15 @@ def test_the_page_is_drawn_and_fetches_nothing(shown: OpenPage, tmp_path: Path) 
     assert shown.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
+def test_the_contents_lead_to_every_section(shown: OpenPage) -> None:
+    titles = shown.page.locator("section > h2").all_text_contents()
+    assert shown.page.locator(".contents a").all_text_contents() == titles
+    shown.page.locator(".contents a").last.click()
+    last = shown.page.locator("section").last
+    assert last.get_attribute("id") == shown.page.evaluate("location.hash.slice(1)")
+    shown.page.evaluate("scrollTo(0, 0)")
+
+
 def test_another_quantity_has_its_own_bar(shown: OpenPage) -> None:
     bar = shown.page.locator("#part-0 .bar")
     assert "coverage [%]" in bar.text_content()
