@@ -39,6 +39,7 @@ KEYS = {
     "optimizer.evaluations": "chambers to simulate",
     "objective_half_width": "half-width of the objective",
     "tensile_MPa": "tensile strength",
+    "slope_deg": "slope of the faces",
     "tungsten_carbide": "tungsten carbide",
 }
 # What the page has in the place of a command, or what the command is for where the page lacks it.
