@@ -64,7 +64,7 @@ TIME_TO_98 = Quantity("time-98", "time to 98 % there", "s", "", colours=WIDTH_MA
 def times_to_98(dent_density: np.ndarray, treatment_time: float) -> np.ndarray:
     """Return the time [s] after which each place is covered to 98 %; inf where no ball hits.
 
-    >>> times_to_98(np.array([np.log(50.0)]), 60.0).tolist()
+    >>> times_to_98(np.array([np.log(50.0)]), 60.0).round(6).tolist()
     [60.0]
     """
     with np.errstate(divide="ignore"):
