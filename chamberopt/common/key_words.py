@@ -21,6 +21,18 @@ AIMS = {
     "minus_treatment_time_s": "the shortest treatment time that meets all limits",
     "intensity_uniformity": "the most even peening strength",
 }
+# Kinds of holders and masks; "filled" is what a block of a mask becomes.
+KINDS = {
+    "rod": "rod on a face",
+    "collar": "collar round an end or a shaft",
+    "plate": "plate on a face or round a root",
+    "arbor": "arbor: a shaft through a hole",
+    "bore": "the part itself, out through the wall",
+    "shell": "shell on the faces",
+    "plugs": "plugs that fill holes",
+    "block": "block on the faces, up to the wall",
+    "filled": "block on the faces, up to the wall",
+}
 _ITEM = re.compile(r"\.([012])$")
 _UNIT = re.compile(rf"_({'|'.join(sorted(UNITS, key=len, reverse=True))})$")
 _ALONG = re.compile(r"(?:deg|mm|axis)\.([012])$")  # along x, y and z

@@ -95,20 +95,49 @@ def on_average(result: Result) -> str:
     return f"{full_coverage(result)}; covered to {mean} on average"
 
 
-def answer_lines(result: Result) -> list[AnswerLine]:
+def answer_lines(result: Result, start: Result | None = None) -> list[AnswerLine]:
     """Return sentences that qualify the answer.
 
-    The sentences say whether the time is enough and the wanted intensity there, what each step
-    does, which limits of zones and constraints are met, and name doubts about the calibration.
+    The sentences say whether the time is enough and the wanted intensity there, how much less hard
+    a study's best chamber peens than the start, what each step does, which limits of zones and
+    constraints are met, and name doubts about the calibration.
     """
     lines = [*time_lines(result), *range_answer(result)]
     lines += intensity_lines(result.design, result.metrics)
-    lines += [*step_lines(result), *zone_lines(result), *_constraint_lines(result)]
+    lines += [
+        *_softer_lines(result, start),
+        *step_lines(result),
+        *zone_lines(result),
+        *_constraint_lines(result),
+    ]
     calibration = result.design.calibration
     doubts = [*misfit_texts(calibration), calibration.not_mmA] if calibration else []
     return lines + [
         AnswerLine("calibration", f"{one[0].upper()}{one[1:]}.", True) for one in doubts if one
     ]
+
+
+def _softer_lines(result: Result, start: Result | None) -> Iterator[AnswerLine]:
+    """Yield a sentence on intensity and speed that the best chamber surely has less than the start.
+
+    A gain in time or evenness may cost them, which no limit of the study need tell.
+    """
+    if start is None:
+        return
+    strength = "almen_intensity" if "almen_intensity" in result.metrics else "strength_um"
+    texts = []
+    for name in (strength, "mean_normal_speed_m_s"):
+        after, before = result.metrics.get(name), start.metrics.get(name)
+        if after is None or before is None:
+            continue
+        lost = change(after, before, result, start)
+        if not lost.in_words and lost.high < 0.0:
+            label = metric_label(name)
+            texts.append(
+                f"the {label.text} goes from {label.format(before)} to {label.format(after)}"
+            )
+    if texts:
+        yield AnswerLine("best", f"It peens less hard than the start: {', '.join(texts)}.", True)
 
 
 def _constraint_lines(result: Result) -> Iterator[AnswerLine]:

@@ -40,7 +40,9 @@ MAIN = (
     "strength_um",
     "mean_normal_speed_m_s",
 )
-SHOWN_AS_TILES = ("mean_coverage", "p05_coverage", "time_to_98_s")  # besides the objective
+
+
+TELLS_APART = "The time to 98 % there tells places apart."
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,6 @@ def main_figures(shown: Sequence[Figure]) -> list[Figure]:
 
 def tiles(shown: Sequence[Figure]) -> Tiles:
     """Return the objective and the main metrics as tiles: large numbers at the head of a report."""
-    chosen = [shown[0], *(one for one in shown[1:] if one.name in SHOWN_AS_TILES)]
     return Tiles(
         [
             Tile(
@@ -143,7 +144,7 @@ def tiles(shown: Sequence[Figure]) -> Tiles:
                 one.label.format(one.result),
                 one.label.format(one.start) if one.start is not None else "",
             )
-            for one in chosen
+            for one in main_figures(shown)
         ]
     )
 
@@ -175,7 +176,11 @@ def coverage_section(
         for name, scene in scenes.items()
         if scene.coverage is not None
     }
-    if drawn:
+    is_flat = all(scene.is_saturated for scene in scenes.values())
+    if is_flat:
+        text = "All of it would be one bar of a histogram, from 95 to 100 %. "
+        content.append(Sentence(text + TELLS_APART, "soft"))
+    elif drawn:
         caption = (
             "How much of the target's area has which coverage at the end of the treatment, "
             "as the picture above shows it. Both are of single windows, where counted dents "

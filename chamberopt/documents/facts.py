@@ -7,7 +7,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from chamberopt.common.key_words import in_words, unit_of
+from chamberopt.common.key_words import KINDS, in_words, unit_of
 from chamberopt.common.number_text import counted, plain
 from chamberopt.documents.proposal import INDENT, wrapped
 
@@ -132,6 +132,9 @@ def _texts(values: Mapping[str, Any]) -> Iterator[str]:
     """Yield a text for each fact, such as "area 1150 mm²"; counts of triangles are no use."""
     for key, value in values.items():
         if key.endswith("triangles") or value == []:
+            continue
+        if key == "kind":
+            yield KINDS.get(value, value)
             continue
         unit = unit_of(key)
         factor = 100.0 if unit == "%" else 1.0

@@ -84,7 +84,10 @@ def result_overview(result: Result) -> Section:
     start = load_start(result)
     content: list[Block] = [
         Sentence(answer(result, start), "sentence"),
-        *(Sentence(one.text, "warning" if one.warns else "") for one in answer_lines(result)),
+        *(
+            Sentence(one.text, "warning" if one.warns else "")
+            for one in answer_lines(result, start)
+        ),
         figures_table(figures(result, start)),
         Sentence(limits_of_intervals(result), "soft"),
     ]
@@ -129,7 +132,8 @@ def _settings(design: Design, chamber: Chamber | None) -> Iterator[tuple[str, st
             yield f"chamber, {name}", text
     yield "sonotrode", f"{amplitude_text(design.sonotrode)}, {design.sonotrode.frequency_khz:g} kHz"
     balls = (f"{count:,} of Ø {plain(1e3 * d)} mm" for d, count in design.shot.sizes)
-    yield "shot", f"{', '.join(balls)}, {design.shot.material or 'material not named'}"
+    material = (design.shot.material or "material not named").replace("_", " ")
+    yield "shot", f"{', '.join(balls)}, {material}"
     yield "peening time", f"{plain(design.process.treatment_time)} s"
     accuracy = design.process.accuracy
     yield "simulated", f"{accuracy.replicas} replicas of {plain(design.process.recorded_time)} s"

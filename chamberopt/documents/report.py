@@ -118,7 +118,7 @@ def report(result: Result) -> Document:
         _design(result, start),
         _made_with(result),
     )
-    said, lines = answer(result, start), answer_lines(result)
+    said, lines = answer(result, start), answer_lines(result, start)
     return Document(name, _subtitle(result), said, lines, [one for one in sections if one])
 
 
@@ -132,7 +132,10 @@ def answer_section(result: Result, start: Result | None) -> Section:
         "The answer",
         [
             Sentence(answer(result, start), "sentence"),
-            *(Sentence(one.text, "warning" if one.warns else "") for one in answer_lines(result)),
+            *(
+                Sentence(one.text, "warning" if one.warns else "")
+                for one in answer_lines(result, start)
+            ),
             tiles(figures(result, start)),
             Sentence(limits_of_intervals(result), "soft"),
         ],

@@ -409,7 +409,10 @@ def amplitude_text(face: VibratingFace) -> str:
 
 def _shot(result: Result) -> Iterator[Row]:
     shot = result.design.shot
-    yield "material", f"{shot.material or 'not named'}, {plain(shot.density)} kg/m³"
+    yield (
+        "material",
+        f"{(shot.material or 'not named').replace('_', ' ')}, {plain(shot.density)} kg/m³",
+    )
     several, sizes = len(shot.sizes) > 1, []
     for diameter, count in shot.sizes:
         mass = 1e3 * shot.density * np.pi / 6.0 * diameter**3 * count

@@ -12,7 +12,7 @@ import numpy as np
 
 from chamberopt.common.estimate import Estimate, finite_or_none
 from chamberopt.common.files import read_file
-from chamberopt.common.key_words import AIMS, inner_first, title_with_unit
+from chamberopt.common.key_words import AIMS, inner_first, title_with_unit, unit_of
 from chamberopt.documents.document import (
     Beside,
     Block,
@@ -25,6 +25,7 @@ from chamberopt.documents.document import (
 )
 from chamberopt.documents.wording import (
     Label,
+    metric_label,
     objective_label,
     per_cent,
     plain,
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
     from chamberopt.results.records import ModelRecord, StudyRecord
     from chamberopt.search.trial_log import Trial
 
+ALGORITHMS = {"sobol": "spread evenly", "surrogate": "chosen by a model of those before"}
 NO_CONSTRAINTS = "There were no constraints."
 
 
@@ -70,7 +72,7 @@ def question_section(result: Result) -> Section:
     text = (
         f"Which chamber gives the {aim} {label.in_full}? "
         f"The part is {part}; its target{reach} is peened {peening}. "
-        f"{study.evaluations} candidates were tried, chosen by: {study.algorithm}."
+        f"{study.evaluations} candidates were tried, {_chosen_by(study.algorithm)}."
     )
     constraints = _constraints(result)
     limits = f"Constraints: {', '.join(constraints)}." if constraints else NO_CONSTRAINTS
@@ -85,6 +87,11 @@ def question_section(result: Result) -> Section:
     ]
     table = Table("What was varied", ("parameter", "bounds", "start", "best"), varied)
     return Section("The question", [Beside([[Sentence(text), Sentence(limits)], [table]])])
+
+
+def _chosen_by(phases: str) -> str:
+    """Return in words how a search chose its candidates, by the names of its phases."""
+    return ", then ".join(ALGORITHMS.get(one, f"by {one}") for one in phases.split(", then "))
 
 
 def aim_in_words(tables: Mapping[str, Any]) -> str:
@@ -112,7 +119,8 @@ def _constraints(result: Result) -> list[str]:
         tables = tomllib.loads(read_file(result.path(STUDY)).decode())
     of_study = [
         " and ".join(
-            f"{name} {'≥' if side == 'min' else '≤'} {limit:g}" for side, limit in limits.items()
+            _limit_in_words(name, "≥" if side == "min" else "≤", limit)
+            for side, limit in limits.items()
         )
         for name, limits in tables.get("constraints", {}).items()
     ]
@@ -120,6 +128,14 @@ def _constraints(result: Result) -> list[str]:
     return of_study + [
         f"{limit_text(one)} of zone {zone.name}" for zone in zones for one in zone.limits
     ]
+
+
+def _limit_in_words(name: str, sign: str, limit: float) -> str:
+    """Return a limit of a metric, or of a number of the design, in the unit that is shown."""
+    if "." in name:
+        return f"{inner_first(name)} {sign} {plain(limit)} {unit_of(name)}".rstrip()
+    label = metric_label(name)
+    return f"{label.text} {sign} {plain(label.factor * limit)} {label.unit}".rstrip()
 
 
 def front_section(study: StudyRecord) -> Section | None:

@@ -55,7 +55,7 @@ def result_end(folder: Path, verbose: bool) -> list[Table | str]:
     result = load_result(folder)
     start, study, record = load_start(result), result.study, result.record
     all_figures = figures(result, start)
-    lines = sorted(answer_lines(result), key=lambda one: (one.warns, RANK.index(one.about)))
+    lines = sorted(answer_lines(result, start), key=lambda one: (one.warns, RANK.index(one.about)))
     said = [f"warning: {one.text}" if one.warns else one.text for one in lines]
     notes, content = [one.said for one in record.effects or ()], [answer(result, start), ""]
     if study and start:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text
-from chamberopt.design.intensity import OUTSIDE, Comparison
+from chamberopt.design.intensity import OUTSIDE, Comparison, PredictedIntensity
 from chamberopt.documents.document import AnswerLine
 from chamberopt.documents.ranges import groups_text, slow_end_is_late, time_at_slow_end
 from chamberopt.documents.wording import metric_label, plain
@@ -115,12 +115,19 @@ def _of_process(text: str, warns: bool) -> AnswerLine:
 
 
 def intensity_lines(design: Design, metrics: Mapping[str, Estimate]) -> Iterator[AnswerLine]:
-    """Yield a sentence on the wanted intensity, if there is one. It warns if it is outside."""
+    """Yield a sentence on the intensity, beside the wanted one if there is one.
+
+    It warns if it is outside. With none wanted, one that strips tell is among the figures.
+    """
     if design.process.intensity_mmA is not None:
         found = Comparison.of(design.process.intensity_mmA, metrics, design.calibration)
         wanted = f"Almen intensity wanted {intensity_text(design)}: {found.in_words}"
         text = f"{wanted}; predicted {found.predicted}."
         yield _of_process(text, found.standing == OUTSIDE)
+    elif "almen_intensity" not in metrics and (
+        one := PredictedIntensity.of(metrics, design.calibration)
+    ):
+        yield _of_process(f"Almen intensity: {one.in_words}.", False)
 
 
 def wanted_rows(result: Result) -> Iterator[tuple[str, str]]:

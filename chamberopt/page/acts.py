@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from itertools import count, product
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from chamberopt.chamber.part import preview_part
-from chamberopt.chamber.propose.text import study_of_design
+from chamberopt.chamber.propose.text import GOALS, study_of_design
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import (
     INPUTS,
     RESULT,
     check_new_file,
     is_new_or_empty,
+    private_folder,
+    read_file,
     remove_file,
     write_text,
 )
-from chamberopt.common.key_words import inner_first, unit_of
+from chamberopt.common.key_words import AIMS, inner_first, unit_of
 from chamberopt.common.toml_fields import read_toml
+from chamberopt.coverage.metrics import OBJECTIVES, metric_problem
 from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
 from chamberopt.documents.answer import on_average
@@ -35,7 +41,7 @@ from chamberopt.page.checker import Checker
 from chamberopt.page.duration import duration_in_words
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
-from chamberopt.page.page_words import amplitudes_named, balls_named, explained, on_page
+from chamberopt.page.page_words import CHOICES, amplitudes_named, balls_named, explained, on_page
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
 from chamberopt.page.structure import (
@@ -49,19 +55,25 @@ from chamberopt.page.study_answers import candidate_answer, candidates_answer, m
 from chamberopt.printers.html import section
 from chamberopt.printers.report_page import REPORT, parts_content, viewer
 from chamberopt.printers.sheet_page import SHEET
-from chamberopt.results.compare.comparison import compare, differing_values
+from chamberopt.results.compare.comparison import compare, differing_values, values_before
 from chamberopt.results.load import Result, load_result, load_start
 from chamberopt.search.study import load_study
+from chamberopt.search.study.parameters import Vary
 from chamberopt.search.study_folder import STUDY, is_finished, is_study_folder, read_inputs
+from chamberopt.workflows.comparison_folder import draw_differences
 
 MOST_VALUES = 6  # by which results differ, in the line of each
 DEEPEST = 4  # levels of folders below the design's folder that are searched for results
 
 
-def list_results(folder: Path) -> list[dict[str, object]]:
+def list_results(folder: Path, now: Design) -> list[dict[str, object]]:
     """List all results and studies below a folder, the newest first.
 
     Each has a line on its coverage, and on the numbers of its design by which the results differ.
+    The line `stale` says in what its design was another than the one on the page; "" for nothing.
+
+    Args:
+        now: the design on the page.
     """
     rows, results = [], {}
     for where in _result_folders(folder):
@@ -72,6 +84,7 @@ def list_results(folder: Path) -> list[dict[str, object]]:
             result = load_result(where)
             results[row["folder"]] = result
             row["text"] = on_average(result)
+            row["stale"] = _stale(result, now)
         except InputError as error:
             unfinished = row["is_study"] and not is_finished(where)
             row["text"] = "a study that has not finished" if unfinished else str(error)
@@ -103,12 +116,25 @@ def _differences(results: Sequence[Result]) -> list[str]:
     names = [name for name in found if "." in name and not name.startswith("process.accuracy.")]
     return [
         ", ".join(
-            f"{inner_first(name)} {f'{value_text(found[name][k])} {unit_of(name)}'.rstrip()}"
+            _value_in_words(name, found[name][k])
             for name in names[:MOST_VALUES]
             if found[name][k] is not None
         )
         for k in range(len(results))
     ]
+
+
+def _value_in_words(name: str, value: object) -> str:
+    text = CHOICES.get(str(value)) or value_text(value)
+    return f"{inner_first(name)} {text} {unit_of(name)}".rstrip()
+
+
+def _stale(result: Result, now: Design) -> str:
+    """Return a sentence on the numbers that a result was simulated with, if others are now."""
+    before = values_before(result, now)
+    texts = [_value_in_words(*one) for one in before.items()][:MOST_VALUES]
+    more = f" and {len(before) - MOST_VALUES} more" if len(before) > MOST_VALUES else ""
+    return f"Not of the design as it is now. It had: {', '.join(texts)}{more}." if texts else ""
 
 
 def shown(folders: Sequence[Path]) -> dict[str, object]:
@@ -124,6 +150,19 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
         result = load_result(folders[0])
         first = answer_section(result, load_start(result))
     return {"content": content, "html": explained(section(first, viewer) + html)}
+
+
+def difference(folders: Sequence[Path]) -> dict[str, str]:
+    """Return the picture of where a later result covers more or less than the first, or why not.
+
+    Raises:
+        InputError: a folder has no usable result, or the results cannot be compared.
+    """
+    with private_folder() as place:
+        picture = Path(place, "difference.png")
+        if why := draw_differences(picture, compare(folders)):
+            return {"why": why}
+        return {"picture": f"data:image/png;base64,{b64encode(read_file(picture)).decode()}"}
 
 
 MOST_FILES = 20  # versions of the design's text that are kept for the pages that read them
@@ -251,6 +290,7 @@ class Acts:
             "chosen": {name: _chosen(design, name) for name in picked_surfaces(design)},
             "is_drawn": design.chamber.setup() is not None,
             "files": _files_beside(file.path),
+            "aims": [(name, AIMS[name]) for name in _aims(design)],
         }
 
     def study(self, asked: Any) -> dict[str, object]:
@@ -264,8 +304,10 @@ class Acts:
         bounds = {key: {"low": low, "high": high} for key, (low, high) in asked["vary"].items()}
         if not bounds:
             raise InputError("nothing varies: tick the numbers that the search may change")
+        if (aim := str(asked["aim"])) not in _aims(file.design):
+            raise InputError(f"{aim}: nothing that a search of this design can be after")
         start = {key: f"now {file.design.value(key):g}" for key in bounds}
-        asked_for = file.design, bounds, start, int(evaluations)
+        asked_for = file.design, bounds, start, int(evaluations), GOALS[aim]
         write_text(path, study_of_design(file.path.name, *asked_for))
         try:
             load_study(path)
@@ -359,7 +401,7 @@ class Acts:
                 with suppress(InputError):
                     self._refuse_shape(path)
                     if inputs.is_of(load_study(path)):
-                        return row["name"]
+                        return str(row["name"])
         raise InputError(
             f"{folder.name}: no study file here asks what this study asked, so its file or design "
             "was changed since; restore it, or run the study anew"
@@ -376,11 +418,15 @@ class Acts:
                 "the command line, or begin again with --trust-shape"
             )
 
-    def results(self, _: object) -> list[dict[str, object]]:
-        return list_results(self._path.parent)
+    def results(self, asked: Any) -> list[dict[str, object]]:
+        now = self._file(asked).with_changes(asked["changes"])
+        return list_results(self._path.parent, now)
 
     def shown(self, asked: Any) -> dict[str, object]:
         return shown([self.inside(str(one)) for one in asked["folders"][:2]])
+
+    def difference(self, asked: Any) -> dict[str, str]:
+        return difference([self.inside(str(one)) for one in asked["folders"][:2]])
 
     def inside(self, name: str) -> Path:
         """Return the path of a name in the design's folder.
@@ -474,12 +520,22 @@ def _named_designs(file: Path) -> list[str]:
     return [one for one in named if isinstance(one, str)]
 
 
-def _files_beside(design: Path) -> list[dict[str, str]]:
+def _aims(design: Design) -> list[str]:
+    """Return the objectives that a search of a design can be after, the usual one first."""
+    return [
+        name
+        for name in GOALS
+        if not any(metric_problem(design, term) for term in OBJECTIVES[name].terms)
+    ]
+
+
+def _files_beside(design: Path) -> list[dict[str, Any]]:
     """Return name, kind and words of each readable design or study file in a design's folder.
 
-    The words say what a study is after. The design itself comes first.
+    The words say what a study is after, and `asks` has its question as far as the page can ask it.
+    The design itself comes first.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for path in sorted(design.parent.glob("*.toml"), key=lambda one: (one != design, one.name)):
         with suppress(InputError):
             tables = read_toml(path, "design")[1]
@@ -487,5 +543,17 @@ def _files_beside(design: Path) -> list[dict[str, str]]:
                 words = "this design" if path == design else "another design"
                 kind = "study" if is_study(tables) else "design"
                 words = aim_in_words(tables) if kind == "study" else words
-                rows.append({"name": path.name, "kind": kind, "words": words})
+                row = {"name": path.name, "kind": kind, "words": words}
+                rows.append(row | ({"asks": _question(tables)} if kind == "study" else {}))
     return rows
+
+
+def _question(tables: Mapping[str, Any]) -> dict[str, object]:
+    """Return the aim of a study file, the ends of the numbers it varies, and its evaluations."""
+    ends: dict[str, tuple[float, float]] = {}
+    for name, one in tables.get("vary", {}).items():
+        with suppress(ValueError):  # a form that the page has no field for
+            varied = TypeAdapter(Vary).validate_python(one)
+            ends |= {} if varied.texts else {name: varied.bounds}
+    count = tables.get("optimizer", {}).get("evaluations")
+    return {"aim": tables.get("objective", {}).get("name"), "vary": ends, "evaluations": count}

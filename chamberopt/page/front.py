@@ -15,6 +15,7 @@ from chamberopt.chamber.propose.shop import load_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import check_new_file, read_file, remove_file, write_bytes
 from chamberopt.common.shipped import shipped_files
+from chamberopt.common.toml_errors import did_you_mean
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.calibration import Calibration
 from chamberopt.design.design import Design, validate
@@ -107,7 +108,7 @@ class Front:
             "shops": [name for name, kind in tables if kind == "shop"],
             "calibrations": [name for name, kind in tables if kind == "calibration"],
             "alloys": [(one.name, one.metal) for one in alloys()],
-            "balls": [one.name for one in balls()],
+            "balls": choices([one.name for one in balls()]),
             "shapes": choices(SHAPES),
         }
 
@@ -188,7 +189,7 @@ class Front:
         arguments = ["new", f"./{part.relative_to(self._folder).as_posix()}"]
         for option, (given, allowed) in wanted.items():
             if given and given not in allowed:
-                raise InputError(f"{option}: given {given}; allowed: {', '.join(allowed)}")
+                raise InputError(f"--{option}: given {given!r}; {did_you_mean(given, allowed)}")
             arguments += [f"--{option}={given}"] if given else []
         wishes = {name: str(asked[name]).strip() for name in ("intensity", "coverage", "ball-mm")}
         _require_possible(wishes, str(asked["material"]), bool(asked["pilot"]))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from html import escape
 
-from chamberopt.common.key_words import inner_first
+from chamberopt.common.key_words import KINDS, inner_first
 from chamberopt.geometry.meshes.formats import SUFFIXES
 
 Words = list[str | tuple[str, str]]
@@ -17,15 +17,7 @@ Words = list[str | tuple[str, str]]
 CHOICES = {
     "conformal": "conformal: follows the part",
     "": "none: the part hangs in the air",
-    "rod": "rod on a face",
-    "collar": "collar round an end or a shaft",
-    "plate": "plate on a face or round a root",
-    "arbor": "arbor: a shaft through a hole",
-    "bore": "the part itself, out through the wall",
-    "shell": "shell on the faces",
-    "plugs": "plugs that fill holes",
-    "block": "block on the faces, up to the wall",
-    "random_phase": "random phase",
+    **KINDS,
 }
 OPTIONS = {
     "target": "what is peened",
@@ -41,7 +33,15 @@ OPTIONS = {
     "calibration": "calibration of the machine",
     "no-pilot": "the choice not to simulate",
 }
-KEYS = {"holder.at": "faces of the holder", "mask.at": "faces of the mask"}
+KEYS = {
+    "holder.at": "faces of the holder",
+    "mask.at": "faces of the mask",
+    "optimizer.evaluations": "chambers to simulate",
+    "objective_half_width": "half-width of the objective",
+    "tensile_MPa": "tensile strength",
+    "slope_deg": "slope of the faces",
+    "tungsten_carbide": "tungsten carbide",
+}
 # What the page has in the place of a command, or what the command is for where the page lacks it.
 COMMANDS = {
     "chamberopt simulate": "Simulate, in the tab Run",
@@ -78,15 +78,17 @@ TERMS = {
 }
 _TABLES = (
     "part|chamber|shot|sonotrode|sonotrodes|materials|effects|process|holder|mask|zones|"
-    "tolerances|ranges"
+    "tolerances|ranges|optimizer"
 )
-_DOTTED = rf"(?:{_TABLES})(?:\.\w+)+"
+_DOTTED = rf"(?:vary\.)?(?:{_TABLES})(?:\.\w+)+"
 _GUIDE = r"docs/[\w/]+\.md(?:#[\w-]+)?"
+_BARE = "|".join(key for key in KEYS if "." not in key)
 _COMMAND = "|".join(sorted(map(re.escape, COMMANDS), key=len, reverse=True))
 _KEY = re.compile(
-    rf"{_GUIDE}|(?:{_COMMAND})(?![\w-])|\[(?:{_TABLES})\]|\[{_DOTTED}\]|(?<![\w./]){_DOTTED}|--(?:{'|'.join(OPTIONS)})(?![\w-])"
+    rf"{_GUIDE}|(?:{_COMMAND})(?![\w-])|\[(?:{_TABLES})\]|\[{_DOTTED}\]|(?<![\w./])(?:{_DOTTED}|(?:{_BARE})\b)|--(?:{'|'.join(OPTIONS)})(?![\w-])"
 )
 _TERM = re.compile(rf"(?<![\w./])(?:{'|'.join(map(re.escape, TERMS))})(?![\w./])")
+_PLACE = re.compile(r"(?m)^\S*\.toml:\d+: ")  # of a line in a file, which the page does not show
 _FILES = (".toml", ".json", ".html", ".pdf", ".png", *SUFFIXES)  # "part.stl" is no key
 
 
@@ -103,7 +105,7 @@ def on_page(text: str, known: set[str] | None = None) -> Words:
     ['raise ', ('height of the chamber', 'chamber.height_mm')]
     """
     made: Words = []
-    at = 0
+    at, text = 0, _PLACE.sub("", text)
     known = set() if known is None else known
     for match in sorted((*_KEY.finditer(text), *_TERM.finditer(text)), key=lambda one: one.start()):
         found = match[0]
@@ -117,13 +119,25 @@ def on_page(text: str, known: set[str] | None = None) -> Words:
             continue
         if found.lower().endswith(_FILES):
             continue
-        key = found.strip("[]").removeprefix("effects.")
+        key = found.strip("[]").removeprefix("vary.").removeprefix("effects.")
         words = COMMANDS.get(found) or OPTIONS.get(found[2:]) or KEYS.get(key) or inner_first(key)
         words = "guide" if found.startswith("docs/") else words
         made += [text[at : match.start()]] * (match.start() > at)
         made.append((words, found))
         at = match.end()
     return [*made, *[text[at:]] * (at < len(text))]
+
+
+_LINE = re.compile(r"(?m)^(?:.*\.toml:\d+: )?(?:vary\.)?([a-z][\w.]*): (.+)$")
+
+
+def at_keys(text: str) -> dict[str, Words]:
+    """Return what a message says of each key with which one of its lines begins.
+
+    >>> at_keys("a/design.toml:9: chamber.height_mm: given -5; allowed: from 2 mm")
+    {'chamber.height_mm': ['given -5; allowed: from 2 mm']}
+    """
+    return {key: on_page(said) for key, said in _LINE.findall(text)}
 
 
 _SAID = re.compile(r"(<(?:p|td|th|dt|dd|li|caption)\b[^>]*>)([^<]+)")
@@ -165,4 +179,4 @@ def amplitudes_named(text: str) -> list[float]:
 
 def choices(allowed: tuple[str, ...] | list[str]) -> list[tuple[str, str]]:
     """Return each allowed text with its words on the page."""
-    return [(one, CHOICES.get(one, one)) for one in allowed]
+    return [(one, CHOICES.get(one, one.replace("_", " "))) for one in allowed]

@@ -30,7 +30,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from chamberopt.common.errors import InputError
 from chamberopt.page.checker import SupersededError
 from chamberopt.page.front import Front
-from chamberopt.page.page_words import on_page
+from chamberopt.page.page_words import at_keys, on_page
 from chamberopt.printers.report_page import POLICY
 from sim_core import SceneError
 
@@ -135,9 +135,8 @@ LOOKS_OF_FRONT = "front", "status"
 OF_DESIGN = (
     "read", "part", "surface", "fields", "structure", "step", "remove", "shape", "cavity", "reach",
     "faces", "pick", "save", "study", "start", "shown", "candidates", "candidate", "model",
-    "resume", "more", "duration",
+    "resume", "more", "duration", "results", "difference",
 )  # fmt: skip
-LOOKS_OF_DESIGN = ("results",)
 CLOSED = "no design is open here any more: reload the page"
 NONSENSE = (
     LookupError,
@@ -173,7 +172,8 @@ def make_app(front: Front, port: int) -> OnePerson:
         except SupersededError:
             return JSONResponse({"superseded": True})
         except (InputError, SceneError) as error:
-            return JSONResponse({"error": str(error), "words": on_page(str(error))})
+            text = str(error)
+            return JSONResponse({"error": text, "words": on_page(text), "at": at_keys(text)})
         except NONSENSE as error:
             return JSONResponse({"error": f"not a question of this page: {error!r}"}, 400)
         if isinstance(found, bytes):
@@ -217,7 +217,6 @@ def make_app(front: Front, port: int) -> OnePerson:
         *(route(name, "POST", False) for name in OF_FRONT),
         *(route(name, "GET", False) for name in LOOKS_OF_FRONT),
         *(route(name, "POST", True) for name in OF_DESIGN),
-        *(route(name, "GET", True) for name in LOOKS_OF_DESIGN),
         Route("/files/{name:path}", file),
         Mount("/browser", StaticFiles(directory=BROWSER)),
     ]

@@ -17,6 +17,7 @@ from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.design import Design
 from chamberopt.documents.study import evaluated, reason_without_model, tried_sentence
 from chamberopt.documents.wording import Label, metric_label, objective_label, per_cent
+from chamberopt.page.page_words import on_page
 from chamberopt.pictures.charts.colours import BLUE, COVERAGE_MAP, GREEN, GREY, ORANGE, hex_colours
 from chamberopt.pictures.charts.figure_style import value_range
 from chamberopt.pictures.charts.study import best_so_far
@@ -47,6 +48,7 @@ def candidates_answer(folder: Path) -> dict[str, object]:
     """Return all candidates of a study so far, with what its plots show of them.
 
     Numbers are in the units of their labels. A candidate that was not simulated has no objective.
+    One that is confirmed is named by its number in the search, which is `of`.
 
     Raises:
         InputError: the folder is no study's, or a file of it is damaged.
@@ -58,13 +60,20 @@ def candidates_answer(folder: Path) -> dict[str, object]:
     shown = [evaluated(one, labels[0]) for one in trials]
     numbers, best = best_so_far(shown, smaller)
     objectives = [one.objective for one in shown if one.objective]
+    first = {
+        trial.point: trial.number + 1 for trial in reversed(trials) if trial.stage != "confirm"
+    }
     rows = [
         {
             "number": one.number,
+            "of": (of := first.get(trial.point, one.number)),
+            "name": str(of) if of == one.number else f"{of} again",
             "kind": _kind(trial),
             "is_start": trial.number == 0 and trial.stage == "search",
             "feasible": one.feasible,
             "objective": _interval(one.objective),
+            "told": labels[0].number(trial.goals[0]) if trial.goals else "",
+            "reason": on_page(trial.reason),
             "second": _interval(_second(trial, labels)),
             "values": one.parameters,
         }

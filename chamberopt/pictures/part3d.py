@@ -19,7 +19,7 @@ from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.geometry.triangles import border_edges
 from chamberopt.pictures.charts.colours import EDGES
 from chamberopt.pictures.drawn_part import DrawnPart, colour_range, point_areas
-from chamberopt.pictures.quantities import QUANTITIES
+from chamberopt.pictures.quantities import QUANTITIES, TIME_TO_98, times_to_98
 from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.load import Result
 from chamberopt.results.vtp_files import MM, ZONE, Surface, fixture_marks
@@ -29,6 +29,7 @@ MAX_TRIANGLES = 600_000
 USUAL = np.array([0.55, -0.9, 0.62])  # direction to the camera from the middle of the cavity
 DISTANCE = 1.8  # distance of the camera, in lengths of the cavity's diagonal
 EDGE_ANGLE = 30.0  # degrees; sharper edges of the chamber are drawn
+SATURATED = 95.0  # %; where nearly all of the target has more, coverage tells no places apart
 
 
 @dataclass(frozen=True)
@@ -41,12 +42,14 @@ class PartScene:
         coverage: coverage at points of the target, 0..1, shape (k,); 0 where no ball fits. None if
             there are too few simulated dents to tell points apart.
         area: area of the surface around each point [mm²], shape (k,).
+        is_saturated: whether nearly all of the target is covered to 95 % or more.
     """
 
     data: dict[str, Any] | None
     remarks: tuple[str, ...]
     coverage: np.ndarray | None
     area: np.ndarray
+    is_saturated: bool = False
 
 
 def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -> PartScene:
@@ -64,6 +67,8 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
     reached = np.asarray(whole["reachable"]) > 0.5
     coverage = np.where(reached, whole["coverage"], 0.0) if result.resolves_places else None
     area = point_areas(whole)
+    limits = colour_range([part])
+    is_saturated = limits[0] >= SATURATED
     remarks = []
     count = whole.n_cells
     too_many = f"triangles, more than the {max_triangles:,} that a page"
@@ -72,7 +77,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
             f"The target is drawn with {count:,} {too_many} can draw, so there is no picture here; "
             "chamberopt inspect shows it."
         )
-        return PartScene(None, tuple(remarks), coverage, area)
+        return PartScene(None, tuple(remarks), coverage, area, is_saturated)
     rest = part.rest
     if count + rest.n_cells > max_triangles:
         remarks.append(
@@ -93,10 +98,11 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
     zones = [zone.name for zone in result.design.zones] if ZONE in arrays.elements else []
     surface = arrays.chamber.part.surface
     is_closed = not len(border_edges(arrays.chamber.part.triangles))  # or drawn as a piece
+    treatment = result.design.process.treatment_time
     data = {
         "title": title,
-        "limits": colour_range([part]),  # of coverage after the treatment time, as in pictures
-        "treatment": result.design.process.treatment_time,
+        "limits": limits,  # of coverage after the treatment time, as in pictures
+        "treatment": treatment,
         "curve": [
             [row.time_s, row.mean_coverage, row.half_width]
             for row in result.record.coverage_against_time
@@ -108,6 +114,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
                 if one.column in target.point_data
             },
             "density": _packed(target["dent_density"]),  # gives the coverage at any time
+            TIME_TO_98.name: _packed(times_to_98(np.asarray(target["dent_density"]), treatment)),
         },
         "own": {
             "coverage": _packed(100.0 * arrays.elements["coverage"][triangles]),
@@ -130,15 +137,16 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         "edges": {"ends": _packed(_edges(chamber, np.asarray(chamber["tag"]))), "colour": EDGES},
         "view": _view(chamber, eye),
     }
-    return PartScene(data, tuple(remarks), coverage, area)
+    return PartScene(data, tuple(remarks), coverage, area, is_saturated)
 
 
 def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:
     """Return the quantities that all 3D views of a page can show, as JSON values."""
     keys = ("name", "label", "unit", "title", "colours")
+    coverage, *others = QUANTITIES.values()
     return [
         {key: getattr(one, key) for key in keys}
-        for one in QUANTITIES.values()
+        for one in (coverage, TIME_TO_98, *others)
         if all(one.name in scene["columns"] for scene in scenes)
     ]
 

@@ -98,7 +98,7 @@ def across_line(axes: Axes, start: Point, end: Point, name: str = "") -> None:
             axes.text(x, y, name, size=8.0, ha="center", va="center", weight="bold")
 
 
-_STEPS = np.outer(10.0 ** np.arange(4), (1.0, 1.25, 1.5, 2.0, 2.5, 4.0, 5.0)).ravel()
+_STEPS = np.outer(10.0 ** np.arange(4), (1.0, 2.0, 5.0)).ravel()  # ISO 5455
 SCALES = np.concatenate([_STEPS[::-1], 1.0 / _STEPS[1:]])  # from large to small
 # Room on paper [mm] round a view for its dimensions: left and right, above, below.
 BESIDE, ABOVE, BELOW = 11.0, 9.0, 12.0

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from chamberopt.coverage.metrics import FULL_COVERAGE
 from chamberopt.pictures.charts.colours import COUNT_MAP, COVERAGE_MAP, WIDTH_MAP
 
 
@@ -54,3 +57,15 @@ QUANTITIES = {
         Quantity("zones", "zone", "", "zone"),
     )
 }
+# Of pages, which compute it; coverage is 1 - exp(-dent density · time / treatment time).
+TIME_TO_98 = Quantity("time-98", "time to 98 % there", "s", "", colours=WIDTH_MAP)
+
+
+def times_to_98(dent_density: np.ndarray, treatment_time: float) -> np.ndarray:
+    """Return the time [s] after which each place is covered to 98 %; inf where no ball hits.
+
+    >>> times_to_98(np.array([np.log(50.0)]), 60.0).round(6).tolist()
+    [60.0]
+    """
+    with np.errstate(divide="ignore"):
+        return np.asarray(-np.log1p(-FULL_COVERAGE) * treatment_time / dent_density)

@@ -45,15 +45,17 @@ def items(values: Iterable[object]) -> str:
     return f"<ul>{rows}</ul>" if rows else ""
 
 
-def section(printed: Section, view: Callable[[Sequence[PartScene]], str]) -> str:
+def section(printed: Section, view: Callable[[Sequence[PartScene]], str], name: str = "") -> str:
     """Return the HTML of a section with its title.
 
     Args:
         view: function that returns the HTML of parts in 3D.
+        name: id of the section, for links to it.
     """
     kind = "answer" if printed.is_answer else ""
     content = "".join(block(one, view) for one in printed.content)
-    return f"<section{_class(kind)}><h2>{text(printed.title)}</h2>{content}</section>"
+    place = f' id="{text(name)}"' if name else ""
+    return f"<section{place}{_class(kind)}><h2>{text(printed.title)}</h2>{content}</section>"
 
 
 def block(printed: Block, view: Callable[[Sequence[PartScene]], str]) -> str:

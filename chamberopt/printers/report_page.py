@@ -11,10 +11,12 @@ from pathlib import Path
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, read_file, require_place, write_text
+from chamberopt.documents.coverage import TELLS_APART
 from chamberopt.documents.document import Document, Items, PartView, Section
 from chamberopt.documents.report import report
 from chamberopt.pictures.charts.colours import KINDS, hex_colours
 from chamberopt.pictures.part3d import PartScene, part_scene, quantities_in_all
+from chamberopt.pictures.quantities import TIME_TO_98
 from chamberopt.printers import html
 from chamberopt.results.load import START, Result, load_result, summary
 
@@ -27,6 +29,10 @@ POLICY = (
 )
 VIEW = "view/view3d.js", "view/section.js", "view/round.js", "view/measure.js", "view/tools.js"
 SCRIPTS = "three/three.min.js", *VIEW, "part.js"
+WHY_TIME = (
+    "Nearly all of the target is covered to 95 % or more, so the picture begins with another "
+    "quantity."
+)
 HELP = (
     "Drag to turn, use the wheel to zoom, point at the target to see its numbers there; a click "
     "keeps them in a list."
@@ -69,10 +75,15 @@ def write_report(result: str | Path, path: str | Path | None = None) -> tuple[Pa
     path = require_free_page(loaded.folder / REPORT if path is None else path)
     with claim_file(path):
         document = report(loaded)
+        sections = {f"section-{k}": one for k, one in enumerate(document.sections, 1)}
+        links = " ".join(
+            f'<a href="#{name}">{html.text(one.title)}</a>' for name, one in sections.items()
+        )
         body = (
             f"<header><h1>{html.text(document.name)}</h1>"
-            f"{html.paragraph(document.subtitle, 'soft')}</header>"
-            f"{''.join(html.section(one, viewer) for one in document.sections)}"
+            f"{html.paragraph(document.subtitle, 'soft')}"
+            f'<nav class="contents" aria-label="Contents">{links}</nav></header>'
+            f"{''.join(html.section(one, viewer, name) for name, one in sections.items())}"
         )
         write_page(path, f"{document.name}: report", body, document.scenes)
     return path, document
@@ -179,13 +190,17 @@ def viewer(scenes: Sequence[PartScene]) -> str:
     )
     if not drawn:
         return remarks
+    saturated = all(scene.is_saturated for scene in scenes)
+    first = TIME_TO_98.name if saturated else "coverage"
     options = "".join(
-        f"<option>{html.text(one['label'])}</option>" for one in quantities_in_all(drawn)
+        f"<option{' selected' if one['name'] == first else ''}>{html.text(one['label'])}</option>"
+        for one in quantities_in_all(drawn)
     )
     last = max(
         time for one in drawn for time in (one["treatment"], *(row[0] for row in one["curve"]))
     )
     now = max(one["treatment"] for one in drawn)
+    why = html.paragraph(f"{WHY_TIME} {TELLS_APART}", "soft") if saturated else ""
     panels = ""
     for i, one in enumerate(drawn):
         title = html.text(one["title"])
@@ -198,7 +213,8 @@ def viewer(scenes: Sequence[PartScene]) -> str:
             f"{caption}</figure>"
         )
     return (
-        f'<div class="controls"><label>Colour by <select id="quantity">{options}</select></label>'
+        f'{why}<div class="controls">'
+        f'<label>Colour by <select id="quantity">{options}</select></label>'
         '<label><input type="checkbox" id="fit"> fit the colours to the values shown</label>'
         '<span id="times"><label for="time">after</label>'
         f'<input type="range" id="time" min="0" max="{last:g}" step="{now / 60.0:.15g}" '

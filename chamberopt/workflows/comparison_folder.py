@@ -110,12 +110,29 @@ def _draw_differences(
 
     Return the reason if no image could be drawn, else None.
     """
+    columns = [(one.value, one.real, one.told) for one in local]
+    write_differences(folder / DIFFERENCE, comparison.results[0].folder, columns)
+    return _draw_local(folder / "difference.png", comparison, local)
+
+
+def draw_differences(picture: Path, comparison: Comparison) -> str | None:
+    """Draw the coverage of later results minus coverage of the first.
+
+    Return the reason if no image could be drawn, else None.
+    """
+    first, *others = (read_target_surface(result) for result in comparison.results)
+    for result, one in zip(comparison.results[1:], others, strict=True):
+        require_same_triangles(
+            result.folder, one.target, comparison.results[0].folder, first.target
+        )
+    return _draw_local(picture, comparison, [local_difference(first, other) for other in others])
+
+
+def _draw_local(
+    picture: Path, comparison: Comparison, local: Sequence[LocalDifference]
+) -> str | None:
     first, *later = comparison.labels
-    start, columns = (
-        comparison.results[0].folder,
-        [(one.value, one.real, one.told) for one in local],
-    )
-    write_differences(folder / DIFFERENCE, start, columns)
+    columns = [(one.value, one.real, one.told) for one in local]
     titles = []
     for label, one in zip(later, local, strict=True):
         low, high = (f"{radius:.1f}" for radius in one.radii)
@@ -127,4 +144,4 @@ def _draw_differences(
         shares = f"more on {one.more:.0%}, less on {one.less:.0%} of the target{over}"
         shares = shares.replace("%", "\N{NO-BREAK SPACE}%")
         titles.append(f"{label} minus {first}\n{shares}")
-    return draw_difference(start, columns, titles, folder / "difference.png")
+    return draw_difference(comparison.results[0].folder, columns, titles, picture)

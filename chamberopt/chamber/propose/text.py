@@ -48,6 +48,20 @@ FASTEST = Goal(
     "minus the time after which 95 % of the target's area has 98 %",
     f"max_replicas = {SEARCH_REPLICAS}  # alike for all candidates, to rank them",
 )
+# What a search can be after without limits and without a further number, the usual aim first.
+GOALS = {
+    one.objective: one
+    for one in (
+        FASTEST,
+        MOST_EVEN,
+        MOST_EVEN._replace(
+            objective="p05_coverage", meaning="coverage of the least covered 5 % of the area"
+        ),
+        MOST_EVEN._replace(
+            objective="intensity_uniformity", meaning="how even the peening strength is"
+        ),
+    )
+}
 
 
 def clauses(reason: str) -> tuple[list[str], list[str]]:
@@ -175,19 +189,18 @@ def study_of_design(
     bounds: Mapping[str, Mapping[str, Any]],
     notes: Mapping[str, str],
     evaluations: int,
+    goal: Goal,
 ) -> str:
     """Return the text of a study file that varies numbers of any design.
 
-    It is after the shortest time: after the treatment time nearly all good chambers are even. For a
-    design with steps it is after the most even coverage. A candidate is simulated for as long as
-    the design.
+    A candidate is simulated for as long as the design.
 
     Args:
-        name, bounds, notes, evaluations: as of `study_lines`, of which `name` is its `design`.
+        name, bounds, notes, evaluations, goal: as of `study_lines`, of which `name` is its
+            `design`.
     """
     accuracy = design.process.accuracy
     each = accuracy.replicas * accuracy.simulated_time / SEARCH_REPLICAS
-    goal = MOST_EVEN if design.steps else FASTEST
     return study_lines(name, bounds, notes, evaluations, goal, each)
 
 

@@ -1,10 +1,10 @@
 // The page: its tabs, what is asked of the server as the design changes, and what is said of it.
-import { makeFields, showValues } from "./fields.js";
+import { makeFields, sayAtFields, showValues } from "./fields.js";
 import { fillSurfaces, fillTarget, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import "./study/study.js";
-import { addStep, ask, attempt, change, element, isUnsaved, listen, onPage, read, removeStep, say, showAdded, showStep, state, takeTold, undo, unpack, value, warning, wordsOf } from "./state.js";
+import { addStep, ask, attempt, change, element, isUnsaved, listen, onPage, read, redo, removeStep, say, showAdded, showStep, state, takeTold, undo, unpack, value, warning, wordsOf } from "./state.js";
 import { lookAnew, setHandles, showCavity, showPart, showShape, showState } from "./scene.js";
 
 const find = (id) => document.getElementById(id);
@@ -69,11 +69,11 @@ async function followShape() {
     const changes = asked = state.shown;
     try {
       const answer = unpack(await ask("/shape", { changes, step: state.step }));
-      refuse("");
+      refuse(null);
       if (answer.state.length !== fillTarget.part.triangles.length / 3) await showPartOf(); // its file has changed
       showShape(answer);
       document.body.dataset.shape = String(Number(document.body.dataset.shape ?? 0) + 1);
-    } catch (error) { if (asked === state.shown) refuse(wordsOf(error)); }
+    } catch (error) { if (asked === state.shown) refuse(error); }
   }
   asking = false;
 }
@@ -104,17 +104,18 @@ function followCavity() {
     } catch (error) {
       if (mine !== round) return;
       if (error.superseded) timer = setTimeout(followCavity, AGAIN); // by another page of this design
-      else refuse(wordsOf(error));
+      else refuse(error);
     }
   }, QUIET);
 }
 
 function busy(text) { find("busy").textContent = text; }
 
-function refuse(text) {
-  if (text) busy("");
-  find("error").replaceChildren(...onPage(text));
-  find("error").hidden = !text;
+function refuse(error) {
+  if (error) busy("");
+  find("error").replaceChildren(...onPage(error ? wordsOf(error) : ""));
+  find("error").hidden = !error;
+  sayAtFields(error?.at);
 }
 
 // What is to be settled before the chamber is built, each until a click says that it is.
@@ -170,12 +171,19 @@ listen((what) => {
   find("unsaved").textContent = state.showing || (isUnsaved() ? "not saved yet" : "");
   find("save").disabled = !isUnsaved();
   find("undo").disabled = !state.past.length;
+  find("redo").disabled = !state.undone.length;
   followShape();
   followCavity();
 });
 addEventListener("beforeunload", (event) => { if (isUnsaved()) event.preventDefault(); });
 
 find("undo").addEventListener("click", undo);
+find("redo").addEventListener("click", redo);
+addEventListener("keydown", (event) => { // in a field the keys undo what is typed there
+  if (!(event.ctrlKey || event.metaKey) || event.target.matches("input:not([type=range]), select")) return;
+  const act = { z: event.shiftKey ? redo : undo, y: redo }[event.key.toLowerCase()];
+  if (act) { event.preventDefault(); act(); }
+});
 find("front").addEventListener("click", () => attempt(async () => {
   if (isUnsaved() && !confirm("Go to the parts of this folder? What is not saved is lost.")) return;
   state.changes = {};

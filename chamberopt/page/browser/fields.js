@@ -1,5 +1,5 @@
 // A slider and a field for every number of the design, grouped by its tables; the ends of sliders bound a study.
-import { attempt, change, element, endMove, onPage, original, restructure, say, state, value } from "./state.js";
+import { attempt, change, element, endMove, onPage, original, restructure, state, value } from "./state.js";
 
 const OPEN = ["chamber", "shot", "sonotrode"], POSE = ["part.rotate_deg", "part.offset_mm"];
 const rows = new Map();
@@ -38,8 +38,9 @@ function choiceRow(field) {
     if (!field.is_structure) change({ [field.name]: select.value });
     else attempt(() => restructure(field.name, select.value)).then(showValues); // as it was where it is refused
   });
-  rows.set(field.name, { show: (now) => { select.value = now; }, row: null });
-  return element("div", { className: "field" }, label(field), select);
+  const row = element("div", { className: "field" }, label(field), select);
+  rows.set(field.name, { show: (now) => { select.value = now; }, row });
+  return row;
 }
 
 // Ends that a slider begins with: half and one and a half times the value, within what the schema allows.
@@ -63,20 +64,16 @@ function numberRow(field) {
     slider.step = field.whole ? 1 : 10 ** Math.floor(Math.log10(span / 100)) || "any";
   };
   const bound = (wanted) => {
-    ends.set(field.name, wanted);
+    if (wanted[0] < wanted[1]) ends.set(field.name, wanted);
     scale();
     if (varied.has(field.name)) document.dispatchEvent(new Event("varied"));
-  };
-  const newEnds = () => {
-    const wanted = [Number(low.value), Number(high.value)];
-    if (wanted[0] < wanted[1]) bound(wanted);
-    else scale();
     show(value(field.name));
   };
   const show = (now) => {
     const [least, most] = ends.get(field.name);
     if (now !== null && (now < least || now > most)) { // a study between the ends has the value too
       bound([Math.min(now, least), Math.max(now, most)]);
+      return;
     }
     if (document.activeElement !== box) box.value = now ?? "";
     slider.value = now ?? slider.min;
@@ -86,10 +83,10 @@ function numberRow(field) {
   slider.addEventListener("change", endMove);
   box.addEventListener("change", () => {
     const text = box.value.trim().replace(",", "."), now = text === "" ? null : Number(text);
-    if (Number.isNaN(now)) say(`${field.in_full}: given ${box.value}, which is no number`);
+    if (Number.isNaN(now)) sayAtFields({ [field.name]: `given ${box.value}, which is no number` });
     else change({ [field.name]: now });
   });
-  for (const end of [low, high]) end.addEventListener("change", newEnds);
+  for (const end of [low, high]) end.addEventListener("change", () => bound([Number(low.value), Number(high.value)]));
   const more = element("div", { className: "ends" }, low, "…", high), vary = [];
   if (field.varies && !field.fixed) {
     const tick = element("input", { type: "checkbox", checked: varied.has(field.name) });
@@ -106,8 +103,30 @@ function numberRow(field) {
   row.addEventListener("pointerenter", () => { more.hidden = false; });
   row.addEventListener("pointerleave", () => { more.hidden = !varied.has(field.name) && !row.contains(document.activeElement); });
   scale();
-  rows.set(field.name, { show, row });
+  rows.set(field.name, { show, row, bound });
   return row;
 }
 
 export function showValues() { for (const [name, { show }] of rows) show(value(name)); }
+
+// Let a search change these numbers, between these ends, and no others.
+export function varyOnly(asked) {
+  varied.clear();
+  for (const [name, wanted] of Object.entries(asked)) {
+    if (!state.fields.some((one) => one.name === name && one.varies && !one.fixed)) continue;
+    ends.set(name, wanted);
+    varied.add(name);
+  }
+  makeFields();
+}
+export const bound = (name, wanted) => rows.get(name).bound(wanted);
+
+// Say what is wrong at the fields of the keys that a message names; a pair of numbers at its first.
+export function sayAtFields(faults = {}) {
+  for (const old of document.querySelectorAll(".field > .wrong")) old.remove();
+  for (const [name, words] of Object.entries(faults)) {
+    const { row } = rows.get(name) ?? rows.get(`${name}.0`) ?? {};
+    row?.append(element("p", { className: "wrong", role: "alert" }, ...onPage(words)));
+    row?.closest("details")?.setAttribute("open", "");
+  }
+}

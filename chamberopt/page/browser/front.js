@@ -16,9 +16,8 @@ async function show(part) {
   find("here").hidden = !here.parts.length;
   find("example").hidden = here.parts.length > 0;
   find("part").value = part ?? here.first;
-  const metals = [...new Set(here.alloys.map(([, metal]) => metal))].map((metal) => element("optgroup", { label: metal },
-    ...here.alloys.filter((one) => one[1] === metal).map(([name]) => option(name))));
-  for (const [id, items] of [["material", metals], ["shot", here.balls.map(option)], ["shape", here.shapes.map(option)],
+  find("alloys").replaceChildren(...here.alloys.map(([value, label]) => element("option", { value, label })));
+  for (const [id, items] of [["shot", here.balls.map(option)], ["shape", here.shapes.map(option)],
     ["shop", here.shops.map(option)], ["calibration", here.calibrations.map(option)]]) {
     const chosen = find(id).value; // stays, as a proposal for it may be shown below
     find(id).replaceChildren(find(id).options[0], ...items);

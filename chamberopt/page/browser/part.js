@@ -5,6 +5,7 @@ function showParts({ quantities, scenes, scales, kinds }) {
   const find = (id) => document.getElementById(id);
   const controls = { quantity: find("quantity"), time: find("time"), fit: find("fit") };
   const label = find("label");
+  const CARD = ["coverage", "time-98", "impacts", "speed"]; // beside the pointer; all numbers are in the list of kept places
   const SOLID = ["part", "few", "unreached", "rest"];
 
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
@@ -123,27 +124,32 @@ function showParts({ quantities, scenes, scales, kinds }) {
     const hit = event.buttons || views[i].tool ? null : views[i].at(event, SOLID), scene = scenes[i];
     if (!hit || !["part", "few"].includes(hit.name)) return null;
     const k = hit.corner, t = scene.triangle[k];
-    const rows = quantities.map((one) => {
+    const shown = [], rows = quantities.map((one) => {
       const now = one.name === "coverage";
       const value = now ? covered(scene.columns.density[k], scene) : scene.columns[one.name][k];
-      return [now ? `coverage after ${number(seconds())} s` : one.label, `${number(value)} ${one.unit}`];
+      const row = [now ? `coverage after ${number(seconds())} s` : one.label, `${number(value)} ${one.unit}`];
+      if (CARD.includes(one.name) || one === chosen()) shown.push(row);
+      return row;
     });
+    const surface = scene.names[scene.surface[t]] ?? "no name", zone = scene.zones[scene.zone[t] - 1] ?? "none";
+    for (const table of [rows, shown]) {
+      if (scene.names.length) table.unshift(["surface", surface]);
+      if (scene.zones.length) table.unshift(["zone", zone]);
+    }
     rows.unshift(["place x, y, z", Measure.at(hit.place)]);
-    if (scene.names.length) rows.splice(1, 0, ["surface", scene.names[scene.surface[t]] ?? "no name"]);
-    if (scene.zones.length) rows.splice(1, 0, ["zone", scene.zones[scene.zone[t] - 1] ?? "none"]);
     rows.push([`coverage of the triangle after ${number(scene.treatment)} s`, `${number(scene.own.coverage[t])} %`],
       ["width of its 95 % interval", `${number(scene.own.interval[t])} %`],
       ["simulated impacts on the triangle", String(scene.impacts[t])]);
-    return { rows, title: `element ${scene.element[t]}, triangle ${scene.number[t]} of the part` };
+    return { rows, shown, title: `element ${scene.element[t]}, triangle ${scene.number[t]} of the part` };
   }
 
   function point(event, i) {
-    const { rows, title } = known(event, i) ?? {};
+    const { rows, shown } = known(event, i) ?? {};
     label.hidden = !rows;
     if (label.hidden) return;
     const table = document.createElement("table");
-    table.createCaption().textContent = title;
-    for (const [name, value] of rows) {
+    table.createCaption().textContent = `a click lists all ${rows.length} numbers`;
+    for (const [name, value] of shown) {
       const row = table.insertRow();
       row.insertCell().textContent = name;
       row.insertCell().textContent = value;

@@ -1,71 +1,92 @@
 // Results below the design's folder: in 3D, one or two side by side, with report and process sheet.
-import { ask, attempt, element, onPage } from "./state.js";
+import { ask, attempt, element, listen, onPage, say, state } from "./state.js";
 import { start } from "./run.js";
-import { closeStudy, followStudy } from "./study/study.js";
+import { followStudy } from "./study/study.js";
 
 const find = (id) => document.getElementById(id), list = find("result-list");
 const FILES = [["report", "report.html", "report"], ["sheet", "process_sheet.pdf", "process sheet"]];
+const ticked = () => [...list.querySelectorAll("input:checked")].map((one) => one.value);
+let seen = []; // folders of the results that are shown
 
-async function refresh() {
-  const rows = await ask("/results");
+const button = (textContent, act) => {
+  const made = element("button", { type: "button", textContent });
+  made.addEventListener("click", act);
+  return made;
+};
+const link = (folder, file, name) => element("a", { href: `/files/${`${folder}/${file}`.split("/").map(encodeURIComponent).join("/")}`, target: "_blank", rel: "noopener", textContent: name });
+
+async function refresh(tick = ticked) {
+  const rows = await ask("/results", { changes: state.changes }), kept = tick();
   list.replaceChildren(...rows.map((row) => {
-    const tick = element("input", { type: "checkbox", value: row.folder, disabled: Boolean(row.unusable) });
-    const item = element("li", {}, element("label", {}, tick, ` ${row.folder}`), element("small", {}, ...onPage(row.words)));
-    if (row.is_study) {
-      const button = element("button", { textContent: "see its candidates" });
-      button.addEventListener("click", () => { closeResults(); followStudy(row.folder); });
-      item.append(button, " ");
-    }
-    for (const [command, file, name] of row.unusable ? [] : FILES) {
-      const button = element("button", { textContent: row[file] ? name : `make the ${name}` });
-      button.addEventListener("click", async () => {
-        const before = button.textContent;
-        if (!row[file]) Object.assign(button, { disabled: true, className: "at-work", textContent: `making the ${name} …` });
-        await attempt(() => open(command, row.folder, file, row[file]));
-        Object.assign(button, { disabled: false, className: "", textContent: before }); // where it could not be made
-      });
-      item.append(button, " ");
-    }
+    const box = element("input", { type: "checkbox", value: row.folder, disabled: Boolean(row.unusable), checked: kept.includes(row.folder) });
+    const item = element("li", {}, element("label", {}, box, ` ${row.folder}`), element("small", {}, ...onPage(row.words)));
+    if (row.stale) item.append(element("small", { className: "warning", textContent: row.stale }));
+    if (row.is_study) item.append(button("see its candidates", () => followStudy(row.folder)), " ");
+    for (const [command, file, name] of row.unusable ? [] : FILES)
+      item.append(row[file] ? link(row.folder, file, `open the ${name}`) : button(`make the ${name}`, (event) => make(event.target, command, row.folder, file, name)), " ");
     return item;
   }));
   if (!rows.length) list.append(element("li", { textContent: "none yet: simulate, or run a study" }));
+  const stale = rows.filter((row) => row.stale && seen.includes(row.folder));
+  find("stale").replaceChildren(...stale.map((row) => element("p", { className: "warning", textContent: `${row.folder}: ${row.stale}` })));
 }
 
-async function open(command, folder, file, isThere) {
-  if (!isThere && (await start(command, folder)).exit !== 0) throw new Error(find("printed").textContent);
-  await refresh();
-  window.open(`/files/${`${folder}/${file}`.split("/").map(encodeURIComponent).join("/")}`, "_blank", "noopener");
+async function make(pressed, command, folder, file, name) {
+  const before = pressed.textContent;
+  Object.assign(pressed, { disabled: true, className: "at-work", textContent: `making the ${name} …` });
+  await attempt(async () => {
+    if ((await start(command, folder)).exit !== 0) throw new Error(find("printed").textContent);
+    await refresh();
+    say([`The ${name} of ${folder} is made: `, link(folder, file, "open it")], true);
+  });
+  Object.assign(pressed, { disabled: false, className: "", textContent: before }); // where it could not be made
 }
 
 find("show-results").addEventListener("click", () => attempt(() => show()));
 async function show() {
-  const folders = [...list.querySelectorAll("input:checked")].map((one) => one.value).reverse(); // the older first
+  const folders = ticked().reverse(); // the older first
   if (!folders.length || folders.length > 2) throw new Error("tick one result, or two to compare");
   const { html, content } = await ask("/shown", { folders });
-  closeStudy();
   closeResults();
+  seen = folders;
   find("shown").innerHTML = html; // the server's own, as in a report; names in it are escaped
+  find("shown").prepend(element("div", { id: "stale" }));
   find("shown").hidden = find("close-results").hidden = false;
   views = showParts(content);
+  await refresh();
+  if (folders.length > 1) await showDifference(folders);
+}
+
+// Where the second result covers more or less than the first, as the command compare draws it.
+async function showDifference(folders) {
+  const place = element("section", { id: "difference" }, element("h2", { textContent: "Difference of coverage" }), "drawing where they differ …");
+  find("shown").querySelector("section").after(place);
+  const { picture, why } = await ask("/difference", { folders }).catch(({ message }) => ({ why: message }));
+  place.lastChild.replaceWith(picture ? element("img", { src: picture, alt: "the part with the difference of coverage at each place" }) : why);
 }
 
 let views = [];
 export function closeResults() {
   for (const view of views) view.dispose();
-  views = [];
+  views = seen = [];
   find("shown").hidden = find("close-results").hidden = true;
-  find("shown").replaceChildren();
+  find("shown").replaceChildren(element("div", { id: "stale" }));
 }
 find("close-results").addEventListener("click", closeResults);
-find("refresh").addEventListener("click", () => attempt(refresh));
-document.querySelector("[data-tab=results]").addEventListener("click", () => attempt(refresh));
-// What a command has found is shown at its end.
+find("refresh").addEventListener("click", () => attempt(() => refresh()));
+document.querySelector("[data-tab=results]").addEventListener("click", () => attempt(() => refresh()));
+listen((what) => { if (what === "changed" && seen.length) refresh().catch(() => {}); }); // the shape says what is wrong
+
+// Show what a command has found.
+const showFolder = (folder) => attempt(async () => {
+  document.querySelector("[data-tab=results]").click();
+  await refresh(() => [folder]);
+  if (ticked().length) await show();
+});
+document.addEventListener("result", ({ detail }) => showFolder(detail));
+// At the end of a command it is shown to who waits for it, and else offered: nobody is taken away from what he looks at.
 document.addEventListener("ended", ({ detail }) => attempt(async () => {
-  if (detail) document.querySelector("[data-tab=results]").click();
-  await refresh();
-  const tick = [...list.querySelectorAll("input")].find((one) => one.value === detail);
-  if (!tick) return;
-  tick.checked = true;
-  await show();
-  for (const one of list.querySelectorAll("input")) one.checked = one.value === detail; // the tab has listed them anew
+  if (detail && !find("run").hidden && find("study-view").hidden) await showFolder(detail);
+  else await refresh();
+  if (detail && !seen.includes(detail)) say([`${detail} is finished. `, button("Show the result", () => showFolder(detail))], true);
 }));

@@ -1,44 +1,75 @@
 // Running the commands on what is saved, and writing a study from the sliders.
-import { ask, attempt, element, isUnsaved, read, say, state } from "./state.js";
-import { ends, varied } from "./fields.js";
+import { ask, attempt, element, isUnsaved, onPage, read, say, state, wordsOf } from "./state.js";
+import { bound, ends, makeFields, varied, varyOnly } from "./fields.js";
 import { bars, followed, sinceBegin } from "./steps.js";
 
 const find = (id) => document.getElementById(id);
 
 export function fillRun() {
-  const chosen = find("of").value;
+  const before = find("of").value;
   const names = state.file.files.map((one) => one.name);
   find("of").replaceChildren(...state.file.files.map(({ name, words }) => element("option", { value: name, textContent: `${name}: ${words}` })));
-  find("of").value = names.includes(chosen) ? chosen : state.file.file;
+  find("of").value = names.includes(before) ? before : state.file.file;
   const free = (k) => `study-of-sliders${k > 1 ? `-${k}` : ""}.toml`;
   let k = 1;
   while (names.includes(free(k))) k += 1;
   find("study-name").value = free(k);
+  const aim = find("aim").value;
+  find("aim").replaceChildren(...state.file.aims.map(([value, textContent]) => element("option", { value, textContent })));
+  if (aim) find("aim").value = aim;
+  else takeQuestion(state.file.files.find((one) => one.asks)); // the page is new: what was proposed is a start
   allow();
   tellDuration();
   showVaried();
 }
 
-let isRunning = false;
+let isRunning = false, refused = ""; // why the chosen file cannot be run
+const chosen = () => state.file.files.find((one) => one.name === find("of").value);
 // A design is simulated; a study is searched or mapped.
 function allow() {
-  const { kind, words } = state.file.files.find((one) => one.name === find("of").value) ?? {};
+  const { kind, words } = chosen() ?? {};
   find("of-words").textContent = kind === "study" ? words : "";
-  for (const button of document.querySelectorAll("[data-command], #search-sliders")) button.disabled = isRunning;
+  for (const button of document.querySelectorAll("[data-command], #search-sliders")) button.disabled = isRunning || (Boolean(refused) && "command" in button.dataset);
   for (const one of document.querySelectorAll(".of-design, .of-study")) one.hidden = one.className !== `of-${kind}`;
 }
-find("of").addEventListener("change", () => { allow(); tellDuration(); });
+find("of").addEventListener("change", () => {
+  takeQuestion(chosen());
+  allow();
+  tellDuration();
+});
 
-// How long the file will take, where the server knows that from results.
+// Begin the search of one's own with the question of a file, if it is a study.
+function takeQuestion(file) {
+  if (!file?.asks) return;
+  const { aim, vary, evaluations } = file.asks;
+  if (state.file.aims.some(([name]) => name === aim)) find("aim").value = aim;
+  if (evaluations) find("evaluations").value = evaluations;
+  varyOnly(vary);
+}
+
+// How long the file will take, where the server knows that from results, or why it will be refused.
 async function tellDuration() {
-  const of = find("of").value, known = await ask("/duration", { of }).catch(() => null);
-  if (find("of").value === of) find("lasts").textContent = known?.words ? `It will take ${known.words}.` : "";
+  const of = find("of").value;
+  refused = "";
+  const known = await ask("/duration", { of }).catch((error) => { refused = wordsOf(error); });
+  if (find("of").value !== of) return;
+  find("lasts").className = refused ? "wrong" : "soft";
+  find("lasts").replaceChildren(...(refused ? [...onPage(refused), element("p", { hidden: !chosen()?.asks, textContent: "The search below asks the same between values that hold those of the design." })]
+    : [known.words ? `It will take ${known.words}.` : ""]));
+  allow();
 }
 document.querySelector("[data-tab=run]").addEventListener("click", tellDuration);
 
 function showVaried() {
-  const items = [...varied].map((name) => element("li", { title: name, textContent: `${state.fields.find((one) => one.name === name)?.in_full}: ${ends.get(name).join(" … ")}` }));
-  find("varied").replaceChildren(...(items.length ? items : [element("li", { textContent: "nothing is ticked yet" })]));
+  const items = [...varied].map((name) => {
+    const { in_full } = state.fields.find((one) => one.name === name);
+    const [low, high] = ends.get(name).map((value, k) => element("input", { type: "number", step: "any", value, ariaLabel: `${in_full}, ${["least", "largest"][k]}` }));
+    for (const end of [low, high]) end.addEventListener("change", () => bound(name, [Number(low.value), Number(high.value)]));
+    const out = element("button", { type: "button", textContent: "✕", title: "leave it as it is", ariaLabel: `Leave ${in_full} as it is` });
+    out.addEventListener("click", () => { varied.delete(name); makeFields(); });
+    return element("li", { title: name }, element("span", { textContent: in_full }), low, "…", high, out);
+  });
+  find("varied").replaceChildren(...(items.length ? items : [element("li", { textContent: "nothing yet" })]));
 }
 document.addEventListener("varied", showVaried);
 
@@ -52,9 +83,9 @@ export async function start(command, of) {
 export async function followToEnd(started) {
   const exit = await follow(started);
   tellDuration();
-  showResult(exit === 0 ? started.result : "");
+  tell("ended", exit === 0 ? started.result : "");
 }
-const showResult = (result) => document.dispatchEvent(new CustomEvent("ended", { detail: result }));
+const tell = (name, detail) => document.dispatchEvent(new CustomEvent(name, { detail }));
 
 // Folder of the study that runs now, or "".
 export const running = () => study;
@@ -67,7 +98,7 @@ function show({ command, result, steps, seconds, lines, exit }) {
   if (exit !== null && command.startsWith("chamberopt new ")) return; // of the front page
   const before = study;
   study = exit === null && isStudy(command) ? result : "";
-  if (study && study !== before) showStudy(study);
+  if (study && study !== before) tell("study", study);
   find("stop").disabled = exit !== null;
   isRunning = exit === null;
   allow();
@@ -86,25 +117,24 @@ function toResult(command, result, exit) {
     made.addEventListener("click", act);
     return made;
   };
-  return [...(exit === 0 ? [button("Show the result", () => showResult(result)), " "] : []),
-    ...(isStudy(command) ? [button("See its candidates", () => showStudy(result))] : [])];
+  return [...(exit === 0 ? [button("Show the result", () => tell("result", result)), " "] : []),
+    ...(isStudy(command) ? [button("See its candidates", () => tell("study", result))] : [])];
 }
 const isStudy = (command) => command.startsWith("chamberopt run ");
-const showStudy = (folder) => document.dispatchEvent(new CustomEvent("study", { detail: folder }));
 
 for (const button of document.querySelectorAll("[data-command]")) button.addEventListener("click", () => attempt(async () => {
   if (isUnsaved()) throw new Error("there are unsaved changes: commands use the saved file, so save or undo them first");
   await followToEnd(await ask("/start", { command: button.dataset.command, of: find("of").value, points: find("points").value }));
-}));
+}, find("run-fault")));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
 // Write the study of the sliders, and run it.
 find("search-sliders").addEventListener("click", () => attempt(async () => {
   if (isUnsaved()) throw new Error("there are unsaved changes: the study begins from the saved design, so save or undo them first");
   const vary = Object.fromEntries([...varied].map((name) => [name, ends.get(name)]));
-  const { study } = await ask("/study", { vary, name: find("study-name").value, evaluations: Number(find("evaluations").value) });
+  const { study } = await ask("/study", { vary, aim: find("aim").value, name: find("study-name").value, evaluations: Number(find("evaluations").value) });
   await read();
   find("of").value = study;
   allow();
   say(`written: ${study}`, true);
   await followToEnd(await ask("/start", { command: "run", of: study }));
-}));
+}, find("search-fault")));

@@ -1,7 +1,7 @@
 // What the page knows: the file as read, changes not yet saved, and questions to the server.
 
 const listeners = [];
-export const state = { file: null, fields: [], surfaces: {}, steps: [], step: 0, changes: {}, past: [], shown: {}, showing: "" };
+export const state = { file: null, fields: [], surfaces: {}, steps: [], step: 0, changes: {}, past: [], undone: [], shown: {}, showing: "" };
 export const listen = (hear) => listeners.push(hear);
 const tell = (what) => { for (const hear of listeners) hear(what); };
 
@@ -21,7 +21,7 @@ export async function ask(path, question) {
   if (isBytes) return answer.arrayBuffer();
   if (answer.status === 403) throw new Error(await answer.text());
   const told = await answer.json().catch(() => ({ error: `the server failed at this (${answer.status})` }));
-  if (told.superseded || told.error) throw Object.assign(new Error(told.error), { superseded: Boolean(told.superseded), words: told.words });
+  if (told.superseded || told.error) throw Object.assign(new Error(told.error), { superseded: Boolean(told.superseded), words: told.words, at: told.at });
   return told;
 }
 
@@ -41,8 +41,7 @@ export async function read(path = "/read", question = {}, before = () => {}) {
   state.file = await ask(path, question);
   takeTold(state.file);
   await before();
-  state.changes = {};
-  state.past = [];
+  Object.assign(state, { changes: {}, past: [], undone: [] });
   showChanges();
   tell("read");
 }
@@ -69,7 +68,7 @@ export const value = (name) => name in state.changes ? state.changes[name] : ori
 export function change(values, move = "") {
   say("");
   if (!move || state.move !== move) state.past.push(state.changes);
-  state.move = move;
+  Object.assign(state, { move, undone: [] });
   state.changes = { ...state.changes, ...values };
   for (const name of Object.keys(values))
     if (inFile(name).some((one) => one.name === name) && state.changes[name] === original(name)) delete state.changes[name];
@@ -103,18 +102,20 @@ async function changeBy(path, asked) {
   if (state.changes !== before) return; // something else was changed meanwhile
   say("");
   state.past.push(before);
-  Object.assign(state, { changes: made, move: "" });
+  Object.assign(state, { changes: made, move: "", undone: [] });
   showChanges();
   tell("changed");
 }
 
 export function endMove() { state.move = ""; }
 
-export function undo() {
-  if (!state.past.length) return;
+// Go back to the changes before the last one, or on to those that were undone.
+export const undo = () => goTo(state.past, state.undone), redo = () => goTo(state.undone, state.past);
+function goTo(from, to) {
+  if (!from.length) return;
   say("");
-  state.changes = state.past.pop();
-  state.move = "";
+  to.push(state.changes);
+  Object.assign(state, { changes: from.pop(), move: "" });
   showChanges();
   tell("changed");
 }
@@ -132,8 +133,8 @@ export const isUnsaved = () => Object.keys(state.changes).length > 0;
 
 const SAID = 4000, REFUSED = 20000; // ms that a message stays
 let fading = 0;
-// Text, or a message of the server: texts, and pairs of words with what they are in a file as a tip.
-export const onPage = (words) => [words].flat().map((one) => typeof one === "string" ? one
+// Text, or a message of the server: texts, and pairs of words with what they are in a file as a tip; or elements.
+export const onPage = (words) => [words].flat().map((one) => typeof one === "string" || one instanceof Node ? one
   : element("abbr", { textContent: one[0], title: one[1] }));
 // A warning as one line, which opens on a click.
 export const warning = (words) => element("details", { className: "warned" }, element("summary", {}, ...onPage(words)));
@@ -147,12 +148,13 @@ export function say(text, good = false) {
   box.className = good ? "good" : "";
   box.hidden = !text;
   clearTimeout(fading);
-  if (text) fading = setTimeout(hide, good ? SAID : REFUSED);
+  if (text) fading = setTimeout(hide, good && typeof text === "string" ? SAID : REFUSED);
 }
 
-// Run an act; what goes wrong is said on the page.
-export async function attempt(act) {
-  try { say(""); return await act(); } catch (error) { say(wordsOf(error)); return undefined; }
+// Run an act; what goes wrong is said in an element beside its button, or over the page.
+export async function attempt(act, place = null) {
+  const tell = (words) => { if (place) place.replaceChildren(...onPage(words)); else say(words); };
+  try { say(""); tell(""); return await act(); } catch (error) { tell(wordsOf(error)); return undefined; }
 }
 
 export function element(tag, properties = {}, ...inner) {

@@ -289,17 +289,36 @@ def _design_values(result: Result) -> dict[str, Any]:
     Three values are added from the result: the number of replicas, the digest of a custom shape,
     and whether the cavity is analytical.
     """
-    values = _flattened(result.design.model_dump(mode="json", exclude=NOT_COMPARED))
+    return {
+        **_values_of(result.design),
+        REPLICAS: result.record.replicas,
+        "shape_sha256": result.record.shape_sha256[:12],
+        "analytic": result.record.analytic,
+    }
+
+
+def _values_of(design: Design) -> dict[str, object]:
+    values = _flattened(design.model_dump(mode="json", exclude=NOT_COMPARED))
     for name in STOPPING_RULES:
         values.pop(name, None)
     if is_custom(values["chamber.shape"]):
         # shape_sha256 is for the content
         values["chamber.shape"] = Path(str(values["chamber.shape"])).name
+    return values
+
+
+def values_before(result: Result, design: Design) -> dict[str, object]:
+    """Return the values of a result's design that a design has otherwise now, by dotted name.
+
+    A value that the result lacks is None. Values of the accuracy are left out.
+    """
+    before, now = _values_of(result.design), _values_of(design)
     return {
-        **values,
-        REPLICAS: result.record.replicas,
-        "shape_sha256": result.record.shape_sha256[:12],
-        "analytic": result.record.analytic,
+        name: before.get(name)
+        for name in dict.fromkeys([*before, *now])
+        if str(before.get(name)) != str(now.get(name))
+        and not name.startswith(("process.accuracy.", "ranges."))
+        and not name.endswith(".v0_for")
     }
 
 

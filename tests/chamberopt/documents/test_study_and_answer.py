@@ -137,7 +137,7 @@ def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
         confirmed=confirmed,
     )
     process = SimpleNamespace(intensity_mmA=None, coverage_percent=None)
-    calibration = SimpleNamespace(misfits=[misfit], not_mmA="")
+    calibration = SimpleNamespace(misfits=[misfit], not_mmA="", has_strips=True)
     design = SimpleNamespace(calibration=calibration, process=process, steps=None)
     result: Any = SimpleNamespace(
         study=study,
@@ -146,13 +146,20 @@ def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
             metric: Estimate(0.12, 0.03),
             "tip.mean_coverage": Estimate(0.9, 0.02),
             "root.mean_coverage": Estimate(0.9, 0.02),
+            "mean_normal_speed_m_s": Estimate(4.1, 0.1),
+            "strength_um": Estimate(80.0, 9.0),
         },
+        seeds=[1],
         design=design,
         objective_name="minus_time_to_98_s",
         objective=Estimate(-200.0, 20.0),
     )
-    lines = answer_lines(result)
+    faster = {"mean_normal_speed_m_s": Estimate(4.4, 0.1), "strength_um": Estimate(81.0, 9.0)}
+    start: Any = SimpleNamespace(metrics=faster, seeds=[2])
+    lines = answer_lines(result, start)
     assert [one.text for one in lines] == [
+        "It peens less hard than the start: the mean normal speed of the impacts goes from "
+        "4.40 ± 0.10 m/s to 4.10 ± 0.10 m/s.",
         "Zone root: intensity_mmA ≥ 0.1 is not known (0.12 ± 0.03 mmA).",
         "Zone tip: no limits; mean coverage 90.0 ± 2.0 %.",
         "The start: constraints not met: shot_count 50 > max 30.",
@@ -162,7 +169,7 @@ def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
         "Calibration: the model explains your dent diameters only with errors 2 times as "
         "large, as intervals have them: look at the picture of the calibration.",
     ]
-    assert [one.warns for one in lines] == [True, False, True, True, True, True]
+    assert [one.warns for one in lines] == [True, True, False, True, True, True, True]
 
 
 @pytest.mark.parametrize(("counts", "keeps"), [(30.0, True), (5.0, False)])

@@ -291,8 +291,17 @@ def test_a_slider_moves_and_is_undone_as_one(opened: Page) -> None:
     opened.page.click("#undo")
     assert float(opened.page.locator('[id="shot.mass_g"]').input_value()) > 3
     opened.page.click("#undo")
-    assert float(opened.page.locator('[id="shot.mass_g"]').input_value()) == 3
+    mass = opened.page.locator('[id="shot.mass_g"]')
+    assert float(mass.input_value()) == 3
     assert opened.page.locator("#undo").is_disabled()
+    opened.page.click("#redo")
+    assert float(mass.input_value()) > 3
+    opened.page.click("#redo")
+    assert float(mass.input_value()) == 7
+    assert opened.page.locator("#redo").is_disabled()
+    opened.page.keyboard.press("Control+z")
+    opened.page.keyboard.press("Control+z")
+    assert float(mass.input_value()) == 3
 
 
 def test_shape_and_holder_are_chosen_in_words(opened: Page) -> None:
@@ -365,6 +374,8 @@ def test_what_is_refused_is_said_and_the_newest_counts(opened: Page) -> None:
     expect(opened.page.locator("#error")).to_contain_text("not below height of the chamber = 4")
     key = opened.page.locator("#error abbr", has_text="height of the chamber").first
     assert key.get_attribute("title") == "chamber.height_mm"
+    row = opened.page.locator('.field:has([id="chamber.sonotrode_distance_mm"])')
+    expect(row.locator(".wrong")).to_contain_text("not below height of the chamber = 4")
     opened.page.click("#save")
     expect(opened.page.locator("#message")).to_contain_text("sonotrode distance of the chamber")
     assert "height_mm = 36" in (opened.served.folder / "design.toml").read_text()
@@ -406,8 +417,14 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     opened.tab("numbers")
     row = page.locator(".field", has=page.locator('[id="shot.mass_g"]'))
     row.hover()
-    row.locator("input[type=checkbox]").check()
+    assert row.locator("input[type=checkbox]").is_checked()  # as in the study beside the design
     opened.tab("run")
+    page.click("[aria-label='Leave Chamber height [mm] as it is']")
+    most = page.locator("[aria-label='Shot mass [g], largest']")
+    most.fill("2.5")
+    most.press("Tab")
+    expect(most).to_have_value("3")  # that of the design is within
+    page.select_option("#aim", "p05_coverage")
     page.fill("#evaluations", "2")
     page.fill("#study-name", "stopped.toml")
     page.click("#search-sliders")
@@ -418,7 +435,9 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     page.locator("#progress").get_by_text("See its candidates").click()
     expect(page.locator("#study-view")).to_be_visible(timeout=WAIT)
     page.click("#close-study")
-    words = "98 % everywhere in the shortest time; varies mass of the shot; tries 2 chambers"
+    words = (
+        "the best coverage of the least covered places; varies mass of the shot; tries 2 chambers"
+    )
     expect(page.locator("#of-words")).to_have_text(words)
     opened.tab("run")
     page.select_option("#of", "design.toml")
@@ -442,6 +461,23 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     opened.tab("run")
     page.locator("#progress").get_by_text("Show the result").click()
     expect(page.locator("#shown #part-0 canvas")).to_have_count(1, timeout=WAIT)
+    expect(page.locator("#stale")).to_be_empty()
+    row.get_by_text("make the report").click()
+    with page.expect_popup(timeout=WAIT) as report:
+        page.locator("#message").get_by_text("open it").click(timeout=WAIT)
+    assert report.value.url.endswith("/files/results/design/report.html")
+    report.value.close()
+    assert row.locator("input").is_checked()
+    page.locator("#result-list li", has_text="by-command").locator("input").check()
+    page.click("#show-results")
+    expect(page.locator("#difference")).to_contain_text("Difference of coverage", timeout=WAIT)
+    expect(page.locator("#difference")).not_to_contain_text("drawing where", timeout=WAIT)
+    assert page.locator("#difference img").count() or "OpenGL" in page.text_content("#difference")
+    page.locator('[id="shot.mass_g"]').evaluate("one => { one.value = 2.9; }")
+    page.locator('[id="shot.mass_g"]').dispatch_event("change")
+    expect(page.locator("#stale")).to_contain_text("It had: mass of the shot 3 g", timeout=WAIT)
+    page.click("#undo")
+    expect(page.locator("#stale")).to_be_empty(timeout=WAIT)
 
 
 @pytest.mark.long

@@ -96,7 +96,7 @@ def test_a_wrong_file_or_wish_is_answered_in_words(front: Served, tmp_path: Path
     wrong = {"unit": "ft", "material": "--help", "shape": "own.py", "shot": "gravel", "pose": "up"}
     for option, given in wrong.items():
         error = front.ask("/propose", PROPOSED | {option: given})["error"]
-        assert f"{option}: given {given}; allowed" in error
+        assert f"--{option}: given {given!r}; allowed" in error
     for wish, said in (
         ({"coverage": "5"}, "--coverage: given 5; allowed: from 100 to 1000 %"),
         ({"ball-mm": "large"}, "--ball-mm: given 'large'; give a number"),

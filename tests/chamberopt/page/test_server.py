@@ -31,7 +31,7 @@ def test_only_the_one_who_has_the_token_is_served(served: Served) -> None:
     assert served.get("/").status == 200
     for path in (
         "/",
-        "/results",
+        "/status",
         "/browser/editor.js",
         "/browser/view/view3d.js",
         "/files/design.png",
@@ -39,10 +39,10 @@ def test_only_the_one_who_has_the_token_is_served(served: Served) -> None:
         assert served.get(path, cookie="").status == 403
     assert served.get("/?token=guessed", cookie="").status == 403
     assert served.get("/", cookie=served.cookie + "x").status == 403
-    assert served.get("/results").status == 200
+    assert served.get("/status").status == 200
     for key in ("", "guessed"):  # a cookie alone, which other servers of this machine may see
         headers = {"x-chamberopt-key": key}
-        assert served.get("/results", **headers).status == 403
+        assert served.get("/status", **headers).status == 403
         assert (
             served._send("POST", "/read", "{}", {"origin": served.origin, **headers}).status == 403
         )
@@ -97,8 +97,13 @@ def test_a_report_cannot_use_the_server(served: Served) -> None:
         ("/study", {"name": "design.toml", "vary": {}, "evaluations": 3}, "exists"),
         (
             "/study",
-            {"name": "s.toml", "vary": {"chamber.height_mm": [40, 60]}, "evaluations": 3},
-            "vary",
+            {
+                "name": "s.toml",
+                "vary": {"chamber.height_mm": [40, 60]},
+                "evaluations": 3,
+                "aim": "p05_coverage",
+            },
+            "given [40, 60], but the design starts at 30",
         ),
         ("/shape", {"changes": {"shot.mass_g": "much"}}, "shot.mass_g: given 'much'"),
         ("/shape", {"changes": {"no.key": 1}}, "not changed on the page"),

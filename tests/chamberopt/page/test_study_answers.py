@@ -88,7 +88,7 @@ def test_the_model_comes_with_its_check_or_the_reason_why_there_is_none(copy: Pa
 
 
 def test_an_unfinished_study_is_listed(copy: Path) -> None:
-    (row,) = list_results(copy.parents[1])
+    (row,) = list_results(copy.parents[1], load_design(copy.parents[1] / "design.toml"))
     assert row["is_study"]
     assert row["unusable"]
     assert row["text"] == "a study that has not finished"

@@ -48,6 +48,16 @@ def test_a_study_is_followed_and_a_candidate_taken(opened: Page, out: Path) -> N
     assert "[mm]" in page.locator("#study-of .slices").text_content()
     assert "height_mm" not in page.locator("#study-view").text_content()
 
+    # a row for each, in which a confirmation has the number of its candidate
+    listed = page.locator("#study-of .rows tbody tr")
+    assert listed.count() == len(rows)
+    named = listed.locator("td:first-child").all_text_contents()
+    again = [one for one in named if one.endswith(" again")]
+    assert len(again) == 2
+    assert all(named[named.index(one) - 1] == one.split()[0] for one in again)
+    assert "a gap of 2.1 mm, in which balls jam" in " ".join(listed.all_text_contents())
+    listed.nth(0).click()
+    opened.wait("data-candidate='1'")
     order.locator(".candidate[data-number='2'] .target").click()
     opened.wait("data-candidate='2'")
     card = page.locator("#chosen-candidate")

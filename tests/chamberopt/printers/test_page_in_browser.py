@@ -80,6 +80,15 @@ def test_the_page_is_drawn_and_fetches_nothing(shown: OpenPage, tmp_path: Path) 
     assert shown.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
+def test_the_contents_lead_to_every_section(shown: OpenPage) -> None:
+    titles = shown.page.locator("section > h2").all_text_contents()
+    assert shown.page.locator(".contents a").all_text_contents() == titles
+    shown.page.locator(".contents a").last.click()
+    last = shown.page.locator("section").last
+    assert last.get_attribute("id") == shown.page.evaluate("location.hash.slice(1)")
+    shown.page.evaluate("scrollTo(0, 0)")
+
+
 def test_another_quantity_has_its_own_bar(shown: OpenPage) -> None:
     bar = shown.page.locator("#part-0 .bar")
     assert "coverage [%]" in bar.text_content()
@@ -128,15 +137,32 @@ def told_at_the_target(shown: OpenPage) -> str:
 
 def test_pointing_at_the_target_shows_its_numbers_and_the_triangles(shown: OpenPage) -> None:
     told = told_at_the_target(shown)
-    assert "element" in told
+    assert len(told.splitlines()) < 8
     assert "surface" not in told  # the file has no names
-    assert "simulated impacts on the triangle" in told
-    for unit in ("%", "1/mm²", "m/s", "°"):
+    for unit in ("%", "1/mm²", "m/s", "time to 98 % there"):
         assert unit in told
-    shown.page.mouse.down()  # a click keeps them
+    shown.page.mouse.down()  # a click keeps all
     shown.page.mouse.up()
     assert shown.page.locator("#places tbody tr").count() == 1
     assert shown.page.locator("#places").is_visible()
+    kept = shown.page.locator("#places").inner_text()
+    for name in ("element", "simulated impacts on the triangle", "place x, y, z", "90° is head on"):
+        assert name in kept
+
+
+def test_a_saturated_target_begins_with_what_tells_places_apart(
+    browser: Any, tmp_path: Path
+) -> None:
+    chamber = build_chamber(DESIGN)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
+        save_simulation(tmp_path / "all", DESIGN, chamber, poisson_evaluation(DESIGN, chamber, 1e3))
+    opened = OpenPage(browser, write_report(tmp_path / "all")[0])
+    assert opened.page.input_value("#quantity") == "time to 98 % there"
+    expect(opened.page.locator("#part-0 .bar")).to_contain_text("[s]")
+    assert opened.page.locator("#histogram").count() == 0
+    assert "one bar of a histogram" in opened.page.content()
+    assert opened.errors == []
 
 
 def test_pointing_names_the_surface(browser: Any, tmp_path: Path) -> None:

@@ -1,5 +1,5 @@
 // Following a study: its candidates as plots while it runs and afterwards, and each one's chamber in the view.
-import { ask, attempt, change, element, say, show } from "../state.js";
+import { ask, attempt, change, element, onPage, say, show } from "../state.js";
 import { followToEnd, running } from "../run.js";
 import { Plot, parallel } from "./plots.js";
 
@@ -21,13 +21,14 @@ export function followStudy(of) {
   look();
 }
 
-export function closeStudy() {
+function closeStudy() {
   folder = "";
   clearTimeout(looking);
   find("study-view").hidden = true;
   show(null);
 }
 find("close-study").addEventListener("click", closeStudy);
+find("study-result").addEventListener("click", () => document.dispatchEvent(new CustomEvent("result", { detail: folder })));
 
 // Look at the study, draw what is new, and look again until it has ended.
 async function look() {
@@ -52,6 +53,7 @@ async function look() {
   const ours = running() === mine;
   find("study-stop").disabled = !ours;
   find("study-resume").disabled = Boolean(running()) || Boolean(data?.finished);
+  find("study-result").disabled = !data?.finished;
   find("study-more").disabled = Boolean(running()) || !data?.candidates.length;
   if (ours || (data && !data.finished)) looking = setTimeout(look, EVERY);
 }
@@ -60,8 +62,7 @@ async function look() {
 function prepared(now) {
   const axes = now.varied;
   for (const one of now.candidates) {
-    const figure = one.objective ? `: ${short(one.objective[0])}${one.objective[1] ? ` ± ${short(one.objective[1])}` : ""}` : "";
-    one.tip = [`candidate ${one.number}, ${WORDS[one.kind]}${figure}`, ...axes.map(({ name, label }) => `${label}: ${one.values[name]}`)].join("\n");
+    one.tip = [`candidate ${one.name}, ${WORDS[one.kind]}${one.told && `: ${one.told}`}`, ...axes.map(({ name, label }) => `${label}: ${one.values[name]}`)].join("\n");
     one.mark = { colour: now.colours[one.is_start ? "start" : one.kind], cross: isCross(one.kind) };
   }
   return { ...now, axes };
@@ -82,18 +83,33 @@ const figure = (caption, ...inner) => element("figure", {}, element("figcaption"
 function draw() {
   const shares = new Map((model?.shares ?? []).map(([name, share, text]) => [name, { share, text }]));
   const axes = data.axes.toSorted((a, b) => (shares.get(b.name)?.share ?? 0) - (shares.get(a.name)?.share ?? 0));
-  find("study-of").replaceChildren(...inOrder(), ...overEach(axes, shares), ...(axes.length > 1 ? [...overTwo(axes), ...overAll()] : []),
+  const before = find("study-of").querySelector(".rows")?.scrollTop ?? 0;
+  find("study-of").replaceChildren(...inOrder(), table(), ...overEach(axes, shares), ...(axes.length > 1 ? [...overTwo(axes), ...overAll()] : []),
     ...(data.objectives.length > 1 ? front() : []), ...(model?.check?.rows?.length ? check() : []));
+  find("study-of").querySelector(".rows").scrollTop = before;
+}
+
+// Every candidate as a row, a confirmation below the candidate that it confirms.
+function table() {
+  const cells = (tag, texts) => texts.map((one) => element(tag, {}, ...[one].flat()));
+  const rows = data.candidates.toSorted((a, b) => a.of - b.of || a.number - b.number).map((one) => {
+    const row = element("tr", { className: one.number === chosen ? "chosen" : "" },
+      ...cells("td", [one.name, ...data.axes.map(({ name }) => String(one.values[name] ?? "")), one.told, [one.is_start ? "the start" : WORDS[one.kind], ...(one.reason.length ? [": ", ...onPage(one.reason)] : [])]]));
+    row.dataset.number = one.number;
+    return row;
+  });
+  const head = element("tr", {}, ...cells("th", ["", ...data.axes.map(({ label }) => label), data.objectives[0], ""]));
+  return element("div", { className: "rows" }, element("table", {}, element("thead", {}, head), element("tbody", {}, ...rows)));
 }
 
 function inOrder() {
-  const { candidates, colours } = data, last = candidates.length + 0.5;
+  const { candidates, colours } = data, last = Math.max(...candidates.map((one) => one.of)) + 0.5;
   const plot = new Plot({ width: wide(), height: 220, x: { low: 0.5, high: last, label: "candidate", whole: true }, y: objectiveAxis(), title: "objective of each candidate" });
   plot.steps(data.best, last, colours.simulated);
-  for (const one of candidates) plot.candidate(one, one.number, one.objective, mark(one));
+  for (const one of candidates) plot.candidate(one, one.of === one.number ? one.of : one.of + 0.2, one.objective, mark(one));
   const kinds = Object.keys(WORDS).filter((kind) => candidates.some((one) => one.kind === kind));
   const marks = [[colours.start, false, "the start"], ...kinds.map((kind) => [colours[kind], isCross(kind), WORDS[kind]])];
-  return [figure("Every candidate in its order, with its 95 % interval; the line is the best so far, as searched.", plot.drawing,
+  return [figure("Every candidate in its order, with its 95 % interval; the line is the best so far, as searched. What is confirmed stands beside its candidate.", plot.drawing,
     element("ul", { className: "marks" }, ...marks.map(([colour, cross, text]) => {
       const sign = element("b", { textContent: cross ? "✕" : "●" });
       sign.style.color = colour;
@@ -195,7 +211,7 @@ async function choose(number) {
   const take = element("button", { id: "take", textContent: "Take these numbers into the design" });
   take.addEventListener("click", () => { change(one.values); say("taken: save the design, or undo", true); });
   const other = one.differs.length ? [element("p", { className: "warning", textContent: `The open design is not the one of this study: it differs in ${one.differs.slice(0, 4).join(", ")}${one.differs.length > 4 ? ` and ${one.differs.length - 4} more` : ""}. The chamber shown is that of the open design with these numbers.` })] : [];
-  find("chosen-candidate").replaceChildren(element("h3", { textContent: `Candidate ${number}` }),
+  find("chosen-candidate").replaceChildren(element("h3", { textContent: `Candidate ${data.candidates[number - 1].name}` }),
     element("p", { textContent: `${WORDS[one.kind]}${one.reason ? `: ${one.reason}` : ""}` }), ...other,
     rows(one.numbers), element("p", {}, take), rows(one.figures));
   document.body.dataset.candidate = String(number);

@@ -141,7 +141,7 @@ def test_what_differs_is_named_and_measured(tmp_path: Path) -> None:
     assert both.parameters["shot.mass_g"] == (PLATE.shot.mass_g, 6.0)
     assert set(both.parameters) == {"shot.mass_g", "process.seed"}
     assert both.labels == ("light", "heavy")
-    lines = {row["folder"]: row["text"] for row in list_results(tmp_path)}  # of the page
+    lines = {row["folder"]: row["text"] for row in list_results(tmp_path, PLATE)}  # of the page
     assert str(lines["heavy"]).startswith("mass of the shot 6 g, seed of the process 2; ")
     assert str(lines["light"]).startswith(f"mass of the shot {PLATE.shot.mass_g:g} g, seed")
     first, second = both.metrics["mean_coverage"]
