@@ -325,7 +325,8 @@ def _chamber(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
     yield from _fixtures(result, openings)
     ball = 1e3 * min(result.design.ball_diameters)
     widest = f"{plain(max(math.floor(100.0 * TIGHT_GAP * ball) / 100.0, LEAST_GAP_MM))} mm"
-    yield "gaps", f"of joints and openings, and round the sonotrode: at most {widest}, or sealed"
+    slit = f"round the sonotrode at most {plain(WIDEST_GAP * ball, 2)} mm"
+    yield "gaps", f"of joints and openings at most {widest}, or sealed; {slit}"
     if volume := result.record.chamber.volume_mm3:
         yield "free volume", f"{plain(1e-3 * volume)} cm³"
 
