@@ -156,6 +156,9 @@ CONFIRM = "confirm that it is what fails in use (choose another: --target)"
 BY_SIZE, BY_SHAPE = f"CHOSEN BY SIZE ALONE: {CONFIRM}", f"CHOSEN BY SHAPE: {CONFIRM}"
 AS_LARGE = 0.9  # of the largest face's area: the target takes a face as large, e.g. a blade's back
 PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
+# Such features are at least this share of the part's area, and stand round an axis: the variances
+# of their middles along both axes of their plane differ by less than RING.
+LARGE_PATTERN, RING = 0.1, 0.1
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
 FACE = re.compile(r"face (\d+)", re.I)
@@ -268,20 +271,35 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
     faces = [one for one in faces if one not in fillets]
     repeated = [one for one in faces if one.keys["faces"][0].get("alike")]
     counts = {one.name: _count(one) for one in repeated}
-    features = [one for one in repeated if counts[one.name] >= PATTERN]
+    features = [one for one in repeated if counts[one.name] >= PATTERN and _is_ring(mesh, one)]
     if features:
         best = max(features, key=lambda one: float(area[one.triangles].sum()))
         fits = {counts[best.name] * k // 2 for k in (1, 2, 4)}
         pattern = [one for one in features if counts[one.name] in fits]
-        others = [one for one in faces if one not in pattern]
-        text = "faces that repeat round the part, such as those of teeth"
-        return _joined(pattern, text + beside(others))
+        size = sum(float(area[one.triangles].sum()) for one in pattern)
+        if size >= LARGE_PATTERN * area.sum():
+            others = [one for one in faces if one not in pattern]
+            text = "faces that repeat round the part, such as those of teeth"
+            return _joined(pattern, f"{text}{beside(others)}; {BY_SHAPE}")
     if fillets:
         text = f"by their shape, as such are usually peened{beside(faces)}; {BY_SHAPE}"
         return _joined(fillets, text)
     sizes = [area[one.triangles].sum() for one in faces]
     large = [one for one, size in zip(faces, sizes, strict=True) if size >= AS_LARGE * sizes[0]]
     return _joined(large, by_size("the largest between sharp edges", faces[len(large) :]))
+
+
+def _is_ring(mesh: PartMesh, alike: Surface) -> bool:
+    """Return whether faces that are alike stand evenly round an axis."""
+    faces = mesh.faces(CREASE_DEG)
+    of, own = faces.of_triangle[alike.triangles], areas(mesh.vertices, mesh.triangles)
+    weight = own[alike.triangles]
+    middle = mesh.vertices[mesh.triangles[alike.triangles]].mean(axis=1)
+    numbers, row = np.unique(of, return_inverse=True)
+    whole = np.bincount(row, weight)
+    places = np.stack([np.bincount(row, weight * x) / whole for x in middle.T], axis=1)
+    _, wide, widest = np.linalg.eigvalsh(np.cov(places.T, bias=True))
+    return len(numbers) > 2 and bool(widest - wide < RING * widest)
 
 
 def _faces(mesh: PartMesh) -> list[Surface]:
@@ -442,6 +460,11 @@ def find_surface(mesh: PartMesh, known: Sequence[Surface], name: str) -> Surface
     if FACE.fullmatch(name):
         faces = [one.name for one in known if FACE.fullmatch(one.name)]
         text = f"the part has {faces[0]} to {faces[-1]}"
+        raise InputError(f"--target: given {name!r}, but {text}")
+    if not mesh.groups:
+        text = (
+            "its file names no surface: give face 1, face 2 ..., of which --target pick shows all"
+        )
         raise InputError(f"--target: given {name!r}, but {text}")
     return _named(
         mesh, name, select_triangles(mesh.groups, [name], len(mesh.triangles), "--target")

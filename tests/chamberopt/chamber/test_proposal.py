@@ -56,6 +56,38 @@ def test_a_study_takes_what_is_proposed(
     assert ranges["shot.mass_g"].high <= min(10000.0, 20000e3 * ball_mass)
 
 
+FEW_BALLS = {"": SimpleNamespace(shot=SimpleNamespace(count=100, diameter=1e-3))}
+
+
+def bosses(ring: bool, wide_mm: float = 6.0) -> PartMesh:
+    """A block of 100 x 100 x 10 mm with twelve bosses on it, in a ring or in two rows."""
+    turns = 2.0 * np.pi / 12.0 * np.arange(12)
+    places = 35.0 * np.c_[np.cos(turns), np.sin(turns)]
+    if not ring:
+        places = np.array([(16.0 * k - 40.0, y) for y in (-15.0, 15.0) for k in range(6)])
+    block = trimesh.creation.box((100, 100, 10))
+    for x, y in places:
+        one = trimesh.creation.cylinder(0.5 * wide_mm, 12.0, sections=36)
+        block = trimesh.boolean.union([block, one.apply_translation((x, y, 10.0))])
+    triangles = block.faces.astype(np.int32)
+    numbering = number_by_position(len(triangles))
+    return PartMesh(1e-3 * block.vertices, triangles, numbering, (), "", {})
+
+
+@pytest.mark.parametrize(("ring", "wide_mm", "said"), [
+    (True, 10.0, "faces that repeat round the part, such as those of teeth"),
+    (False, 10.0, "the largest between sharp edges"),  # they stand round no axis
+    (True, 2.0, "the largest between sharp edges"),  # too small a share of the part
+])  # fmt: skip
+def test_what_repeats_is_a_target_if_it_is_a_large_ring(
+    ring: bool, wide_mm: float, said: str
+) -> None:
+    mesh = bosses(ring, wide_mm)
+    reason = propose_target(mesh, surfaces(mesh), []).reason
+    assert said in reason
+    assert "; CHOSEN BY S" in reason
+
+
 def box_with(names: dict[str, int | tuple[int, ...]]) -> PartMesh:
     """A box of 20 x 20 x 30 mm whose sides 0 to 5 have names: -x, +x, -y, +y, -z, +z."""
     box = trimesh.creation.box((0.02, 0.02, 0.03))
@@ -183,7 +215,7 @@ def test_what_faces_away_is_offered_for_leaving_out(
     made = SimpleNamespace(
         mesh=mesh,
         known=known,
-        design=SimpleNamespace(part=part, steps=None),
+        design=SimpleNamespace(part=part, steps=None, in_steps=FEW_BALLS),
         chamber=SimpleNamespace(part=posed, steps=()),
         tables={"part": {"mesh": str(tmp_path / "gear.obj")}, "part.target": target.keys},
         reasons={},
@@ -240,7 +272,9 @@ def test_names_cannot_write_into_the_design(tmp_path: Path) -> None:
     target = propose_target(mesh, known, [bad])
     tables = {"part": {"mesh": str(tmp_path / f"{bad}.stl")}, "part.target": target.keys}
     reasons = {"part.target": target.reason}
-    text = design_text(SimpleNamespace(tables=tables, reasons=reasons, known=known), tmp_path)
+    design = SimpleNamespace(in_steps=FEW_BALLS)
+    made = SimpleNamespace(tables=tables, reasons=reasons, known=known, design=design)
+    text = design_text(made, tmp_path)
     written = {"part": {"mesh": f"{bad}.stl", "target": {"surface": [bad]}}}
     assert tomllib.loads(text) == written
     choices = [line for line in text.splitlines() if line.startswith("# surface = ")]
