@@ -80,6 +80,27 @@ def depth_below(
     return float(depths[int(share * len(depths))]) if len(depths) else float(np.inf)
 
 
+def bare_behind(
+    vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray, thickest: float
+) -> float:
+    """Return the share of a chosen area with a thinner part under it and nothing chosen behind it.
+
+    Args:
+        vertices, triangles, chosen: those of depth_below.
+        thickest: thickness [m] below which the part is thin.
+    """
+    samples = measure_depth(vertices, triangles, 0.2 * thickest, thickest)
+    own = chosen[samples.triangle]
+    thin = np.flatnonzero(own & np.isfinite(samples.thickness))
+    if not len(thin):
+        return 0.0
+    normal = samples.normal[thin]
+    behind = samples.place[thin] - samples.thickness[thin, None] * normal
+    length = max(thickest, 2.0 * samples.spacing)
+    beyond = _nearest(samples, behind, -normal, length)
+    return float((~chosen[samples.triangle[beyond]]).sum() / own.sum())
+
+
 def only_plates(samples: Samples) -> Samples:
     """Return the points with an infinite thickness where the part is no plate."""
     return samples._replace(thickness=np.where(_in_plate(samples), samples.thickness, np.inf))

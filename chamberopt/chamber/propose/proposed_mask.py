@@ -27,9 +27,11 @@ from chamberopt.chamber.propose.proposed_target import (
     named_or_all,
 )
 from chamberopt.design.design import Design
+from chamberopt.design.intensity import THIN_MM
 from chamberopt.design.part import Selection
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.surface_error import format_point
+from chamberopt.geometry.thickness import bare_behind
 from chamberopt.geometry.triangles import (
     area_vectors,
     areas,
@@ -57,6 +59,7 @@ EDGES = (
     f" outer edges turn by more than {SHARP:g} degrees in the file: break them before it is "
     "peened, as dents roll a burr over them, or guard those that are thin (no source read)"
 )
+ONE_SIDED = 0.25  # share of the target over thin metal with a bare far side, which is told
 MOVED_MM = 0.3  # of an opening, which is milled round the part with less play
 # Names of what fits to other parts, whose size and finish shot would change.
 NEVER = re.compile(
@@ -183,6 +186,16 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     posed = proposal.chamber.part
     if (sharp := sharp_edges(posed.vertices, posed.triangles, posed.target)) > LEAST_EDGES:
         found.append(LeftOut({}, f"SHARP EDGES, {1e3 * sharp:.0f} mm of the target's{EDGES}"))
+    bare = bare_behind(posed.vertices, posed.triangles, posed.target, 1e-3 * THIN_MM)
+    if bare > ONE_SIDED:
+        found.append(
+            LeftOut(
+                {},
+                f"ONE SIDE OF THIN METAL, {bare:.0%} of the target: less than {THIN_MM:.2g} mm "
+                "under it, and the far side is not peened: it bends, as sheets are formed; peen "
+                "both, or agree on it",
+            )
+        )
     if text := moved_openings(proposal.chamber):
         found.append(LeftOut({}, text))
     beside = [one for one in proposal.known if not np.any(one.triangles & target)]

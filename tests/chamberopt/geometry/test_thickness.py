@@ -6,6 +6,7 @@ import trimesh
 from manifold3d import CrossSection
 
 from chamberopt.geometry.thickness import (
+    bare_behind,
     border_distance,
     depth_below,
     measure_depth,
@@ -124,3 +125,12 @@ def test_the_depth_below_a_share_of_a_step(share: float) -> None:
     found = 1e3 * depth_below(vertices, triangles, top, share, 10e-3)
     assert found == pytest.approx(2.0 if share < 0.5 else 6.0, rel=0.02)
     assert depth_below(vertices, triangles, top, 0.9, 5e-3) == np.inf
+
+
+@pytest.mark.parametrize(("thick_mm", "share"), [(1.5, 1.0), (8.0, 0.0)])
+def test_a_sheet_of_which_one_side_is_chosen_is_bare_behind(thick_mm: float, share: float) -> None:
+    sheet = trimesh.creation.box((0.06, 0.06, 1e-3 * thick_mm))
+    up = sheet.face_normals[:, 2]
+    for chosen, wanted in ((up > 0.5, share), (np.abs(up) > 0.5, 0.0), (np.abs(up) < 0.5, 0.0)):
+        found = bare_behind(sheet.vertices, sheet.faces, chosen, 2.3e-3)
+        assert found == pytest.approx(wanted, abs=0.05)
