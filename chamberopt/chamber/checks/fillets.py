@@ -74,6 +74,7 @@ def touched_by_curvature(part: Part, ball: float) -> float:
 
 
 OF_FILLET, OF_SLOT = 0.5, 0.25  # largest shot, over the fillet's radius and the slot's width
+AS_DRAWN = 0.98  # of a drawn radius, which is that of facets to so much
 LEAST_TURN, SHARP = 1.0, 60.0  # least and largest turn at an inner edge of a fillet [degrees]
 FOLD = 15.0  # degrees: an inner edge that turns by more is a fillet, even with a single facet
 HOLLOW = 1.0 / 3.0  # least inward less outward turn near an edge of a fillet, over the whole turn
@@ -179,7 +180,7 @@ def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.nda
 def _fillets(chamber: Chamber, chosen: np.ndarray, largest: float) -> list[str]:
     part = chamber.part
     middle, length, radius, _ = inner_edges(part.vertices, part.triangles, chosen, part.hollow)
-    small = radius * OF_FILLET < largest
+    small = radius * OF_FILLET < AS_DRAWN * largest
     if length[small].sum() < largest:  # a fillet is longer than a ball
         return []
     smallest = _low_quantile(radius[small], length[small])

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chamberopt.chamber.checks.fillets import OF_FILLET, OF_SLOT, inner_edges
+from chamberopt.chamber.checks.fillets import AS_DRAWN, OF_FILLET, OF_SLOT, inner_edges
 from chamberopt.chamber.checks.jams import JAM_BAND, MAX_COSINE, MIN_AREA
 from chamberopt.chamber.largest_ball import largest_balls, spread_points
 from chamberopt.chamber.part import Part
@@ -115,11 +115,11 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
             across = np.where((obstacle >= 0) & (cosine < MAX_COSINE), 2.0 * radius, np.inf)
             width = across - overlap
         in_slot = on & (across < one / OF_SLOT)
-        small = round_ & (OF_FILLET * edges.radius < one)
+        small = round_ & (OF_FILLET * edges.radius < AS_DRAWN * one)
         held = (width >= JAM_BAND[0] * one) & (width <= JAM_BAND[1] * one)
         jams = area[held].sum() >= MIN_AREA * one**2
         touched = on & (radius >= 0.5 * one - overlap)
-        served = touched & ~in_slot & (OF_FILLET * fillet[triangle] >= one)
+        served = touched & ~in_slot & (OF_FILLET * fillet[triangle] >= AS_DRAWN * one)
         suits = area[in_slot].sum() < one**2 and edges.length[small].sum() < one
         jam = float(np.average(width[held], weights=area[held])) if jams else 0.0
         touch, serve = (float(area[rows].sum()) / whole for rows in (touched, served))

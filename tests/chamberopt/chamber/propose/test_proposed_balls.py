@@ -47,6 +47,22 @@ def test_a_ball_touches_what_its_radius_lets_it() -> None:
     assert max(one.served for one in fits) < 0.15
 
 
+@pytest.mark.parametrize(("radius_mm", "serves"), [(4.0, True), (3.8, False)])
+def test_balls_of_half_a_fillets_radius_serve_it(radius_mm: float, serves: bool) -> None:
+    """Two legs with a fillet of 6 degree facets, whose radius is that of the arc, to rounding."""
+    turns = np.radians(np.linspace(0.0, 90.0, 16))
+    arc = radius_mm * (1.0 - np.c_[np.sin(turns), np.cos(turns)]) + 2.0
+    legs = trimesh.creation.extrude_polygon(
+        Polygon([(0, 0), (30, 0), (30, 2), *arc, (2, 30), (0, 30)]), 20
+    )
+    legs.apply_scale(1e-3)
+    middle = 1e3 * legs.triangles_center
+    inside = (middle[:, :2].min(axis=1) > 1.99) & (middle[:, :2].max(axis=1) < 2.0 + radius_mm)
+    fillet = inside & (np.abs(legs.face_normals[:, 2]) < 0.5)
+    (fit,) = fit_sizes(part_of(legs, fillet), [2e-3])
+    assert (fit.served > 0.9) is serves
+
+
 def test_what_a_size_serves_does_not_depend_on_the_sizes_beside_it() -> None:
     """On a round shaft in coarse facets, a ball reaches over edges by a hundredth of its radius."""
     shaft = trimesh.creation.annulus(4.0, 20.0, 10.0, sections=36)
