@@ -21,6 +21,8 @@ from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import in_words
 from chamberopt.common.number_text import plain, rounded
 from chamberopt.documents.document import Table
+from chamberopt.peening.strip import StripSize
+from chamberopt.peening.strip_holder import why_no_strip
 
 if TYPE_CHECKING:
     from chamberopt.chamber.propose.proposal import Proposal
@@ -244,7 +246,8 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
         value = clauses(made.reasons[INTENSITY])[0][0].partition(": ")[0]
         yield "intensity", value, (INTENSITY,)
         distance = f"{tables['chamber']['sonotrode_distance_mm']:g} mm from the sonotrode"
-        yield "strips", f"in the lid in place of the part, {distance}: chamberopt strip", ()
+        strips = f"in the lid in place of the part, {distance}: chamberopt strip"
+        yield "strips", why_no_strip(design, StripSize()) or strips, ()
     accuracy = design.process.accuracy
     simulated = f"{accuracy.replicas} replicas of {plain(accuracy.simulated_time, 3)} s"
     keys = tuple(f"process.accuracy.{key}" for key in tables["process.accuracy"])

@@ -51,19 +51,7 @@ def strip_design(
     Raises:
         InputError: the chamber has a shape without a lid, or the strip does not fit into it.
     """
-    chamber = design.chamber
-    if not isinstance(chamber, PolygonChamber | Cylinder):
-        raise InputError(
-            f'chamber.shape: given "{chamber.shape}"; not supported: a strip in the lid needs a '
-            "cylinder, box or prism; use --at ZONE with a zone of the part"
-        )
-    distance = chamber.sonotrode_distance_mm if distance_mm is None else distance_mm
-    if not 0.0 < distance < chamber.height_mm:
-        raise InputError(
-            f"--distance-mm: given {distance:g}; allowed: above 0 and below chamber.height_mm = "
-            f"{chamber.height_mm:g}"
-        )
-    outline = _outline_mm(chamber, distance)
+    chamber, distance, outline = _lid_of(design, distance_mm)
     _require_room(size, outline)
     thickness = chamber.height_mm - distance + MARGIN_MM
     half_sides = np.abs(outline).max(axis=0) + abs(chamber.slope) * thickness + MARGIN_MM
@@ -78,6 +66,37 @@ def strip_design(
     for of_the_part in ("zones", "tolerances", "holder", "mask"):
         data.pop(of_the_part, None)
     return validate(Design, data)
+
+
+def why_no_strip(design: Design, size: StripSize) -> str:
+    """Return in words why no strip is flush in the lid in the place of the part; "" if it fits."""
+    try:
+        _require_room(size, _lid_of(design, None)[2])
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def _lid_of(
+    design: Design, distance_mm: float | None
+) -> tuple[PolygonChamber | Cylinder, float, np.ndarray]:
+    """Return the chamber, the distance of a lid with a strip, and its outline (n, 2) there [mm].
+
+    Raises InputError for a chamber without a lid, or a distance outside it.
+    """
+    chamber = design.chamber
+    if not isinstance(chamber, PolygonChamber | Cylinder):
+        raise InputError(
+            f'chamber.shape: given "{chamber.shape}"; not supported: a strip in the lid needs a '
+            "cylinder, box or prism; use --at ZONE with a zone of the part"
+        )
+    distance = chamber.sonotrode_distance_mm if distance_mm is None else distance_mm
+    if not 0.0 < distance < chamber.height_mm:
+        raise InputError(
+            f"--distance-mm: given {distance:g}; allowed: above 0 and below chamber.height_mm = "
+            f"{chamber.height_mm:g}"
+        )
+    return chamber, distance, _outline_mm(chamber, distance)
 
 
 def _outline_mm(chamber: ParametricChamber, height: float) -> np.ndarray:
