@@ -40,7 +40,7 @@ from chamberopt.chamber.propose.proposed_steps import (
     with_finer_balls,
     without_finer,
 )
-from chamberopt.chamber.propose.quicker import Way, propose_quicker
+from chamberopt.chamber.propose.quicker import Way, propose_quicker, turns
 from chamberopt.chamber.propose.text import design_text, study_texts
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import local_executor
@@ -275,7 +275,8 @@ class _Pilots:
         self.begin(WAYS)
         made, wanted, found = propose_quicker(way, self._again, self._briefly)
         now = Compared(*propose_second_pose(made, found, self._briefly))
-        return now, replace(wanted, turned_over=bool(now.made.design.steps))
+        over = bool(now.made.design.steps)
+        return now, replace(wanted, turned_over=over, may_turn=turns(now.made))
 
     def _sought(self, now: Compared, wanted: Wanted) -> _Sought:
         """Return what is sought for the part as it stands in a proposal.
@@ -283,12 +284,11 @@ class _Pilots:
         A stated alloy has a usual intensity, which a proposal should not miss.
         """
         made, found = now.made, now.found
-        reasons = {key: made.reasons[key] for key in OF_POSES if key in made.reasons}
         intensity, asked = self.wishes.intensity, self.wishes.asked_intensity()
         is_wish = intensity is not None or not wanted.alloy
         if intensity == USUAL or (not is_wish and found and is_off(made, found.intensity)):
             asked = usual_for(made)
-        return _Sought(wanted, asked, is_wish, reasons)
+        return _Sought(wanted, asked, is_wish, _of_poses(made))
 
     def _with_intensity(
         self, start: Compared, sought: _Sought, asked: WantedIntensity
@@ -306,8 +306,7 @@ class _Pilots:
         over, _ = propose_second_pose(now.made, now.found, self._briefly)
         if over.design.steps and not start.made.design.steps:
             other = sought._replace(
-                wanted=replace(sought.wanted, turned_over=True),
-                reasons={**sought.reasons, ".steps": over.reasons[".steps"]},
+                wanted=replace(sought.wanted, turned_over=True), reasons=_of_poses(over)
             )
             with suppress(InputError):
                 now = self._for_intensity(turned_over(start.made), other, asked)
@@ -404,6 +403,11 @@ class _Pilots:
         self.teller.compile(made.design, made.chamber, None)
         with self.teller.step("pilot run of the intensity") as progress:
             return predict_intensity(made.design, made.chamber, self.executor, progress)
+
+
+def _of_poses(made: Proposal) -> dict[str, str]:
+    """Return the reasons that tell which poses were tried, by dotted name."""
+    return {key: made.reasons[key] for key in OF_POSES if key in made.reasons}
 
 
 def _told(made: Proposal, reasons: dict[str, str]) -> Proposal:

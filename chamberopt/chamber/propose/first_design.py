@@ -103,6 +103,8 @@ IRON = {
     "AMS-S-13165), or ceramic balls, such as --shot zirconia",
     "titanium": "STEEL LEAVES IRON on titanium: decontaminate, or ceramic balls, such as --shot "
     "zirconia (no source read)",
+    "cobalt": "STEEL LEAVES IRON on cobalt, an alloy of implants: decontaminate, or ceramic balls, "
+    "such as --shot zirconia (no source read)",
 }
 ON_STAINLESS = (
     "STEEL LEAVES IRON on stainless steel, which rusts: passivate the part, or ceramic balls, such "
@@ -331,7 +333,8 @@ def _proposed(
             made = held(made, floor, target, above, bores, wanted.shop, progress)
     else:
         made = clamped_outside(made, floor, wanted.shop)
-    turning = turning_bore(bores, mesh, target.triangles)
+    may_turn = wanted.may_turn and wanted.pose is None
+    turning = turning_bore(bores, mesh, target.triangles) if may_turn else None
     if turning is not None:
         with step("trying it on its axis, turning") as progress, suppress(InputError):
             other, its_floor = built(is_local=False, turning=turning)

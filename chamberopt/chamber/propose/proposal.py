@@ -65,6 +65,7 @@ class Wanted:
     calibration: Path | None = None  # file of the machine's calibration
     coverage: float | None = None  # [%], 200 is twice the time to 98 %
     turned_over: bool = False  # after half of the time, as a second step
+    may_turn: bool = True  # about the axis of a bore, where that brings no new fault
 
 
 @dataclass(frozen=True)

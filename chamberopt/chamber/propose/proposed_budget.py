@@ -241,7 +241,7 @@ def _said_of_long(found: Measured) -> str:
     if uneven > UNEVEN:
         return (
             f"the least covered places take {rounded(uneven, 2)} times as long as the target on "
-            "average: [[steps]] in further poses, or more room beside these, may do"
+            "average: more poses ([[steps]]), or more room beside these, may do"
         )
     return "few balls get to the target, or slowly: a larger sonotrode, harder balls or the study"
 

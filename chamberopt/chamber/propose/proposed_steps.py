@@ -61,6 +61,7 @@ OVER = {"x": 0.0, "y": 90.0, "the diagonal of x and y": 45.0, "the diagonal of x
 # times that of the finer ones, and these serve more of the target in less time. For fillets, where
 # parts fail, and for what coarse balls leave bare, they pay in any case.
 STRONGER = 1.5
+NOT_OVER = "; not turned over after half of the time"
 Steps = list[dict[str, Any]]
 """The [[steps]] of a design file."""
 
@@ -86,7 +87,7 @@ def propose_second_pose(
         return made, found
 
     def dropped(why: str) -> tuple[Proposal, Measured | None]:
-        reason = f"{made.reasons['part.rotate_deg']}; not turned over after half of the time: {why}"
+        reason = f"{made.reasons['part.rotate_deg']}{NOT_OVER}: {why}"
         return replace(made, reasons={**made.reasons, "part.rotate_deg": reason}), found
 
     try:
@@ -133,10 +134,9 @@ def turned_over(made: Proposal) -> Proposal:
     )
     if any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air:
         raise InputError("nothing would hold it")
-    over = f"turned over about {axis} after half of the time"
-    return replace(
-        two, reasons={**two.reasons, ".steps": f"{over}, as what looks up gets few dents"}
-    )
+    over = f"turned over about {axis} after half of the time, as what looks up gets few dents"
+    pose = two.reasons["part.rotate_deg"].partition(NOT_OVER)[0]  # with other balls it was not
+    return replace(two, reasons={**two.reasons, "part.rotate_deg": pose, ".steps": over})
 
 
 def _turned_about(made: Proposal, axis: str) -> Proposal:

@@ -201,6 +201,8 @@ def test_a_ring_is_proposed_to_turn_on_an_arbor(tmp_path: Path) -> None:
         return [max(known, key=lambda one: np.hypot(*one.keys["faces"][0]["at_mm"][:2])).name]
 
     turns_on_an_arbor(propose(tmp_path / "ring.stl", Wanted("mm"), outside))
+    for kept in (Wanted("mm", pose="lying"), Wanted("mm", may_turn=False)):
+        assert propose(tmp_path / "ring.stl", kept, outside).design.effects.part_turn is None
 
 
 @pytest.mark.long

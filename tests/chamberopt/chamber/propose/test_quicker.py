@@ -17,7 +17,7 @@ from chamberopt.chamber.propose.held_proposal import rests
 from chamberopt.chamber.propose.pose import Pose, end_to_wall, pose_by_size
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, with_charge
 from chamberopt.chamber.propose.proposed_budget import Measured, TooSlowError
-from chamberopt.chamber.propose.proposed_steps import propose_second_pose, turned_over
+from chamberopt.chamber.propose.proposed_steps import NOT_OVER, propose_second_pose, turned_over
 from chamberopt.chamber.propose.quicker import SEVERAL, Way, propose_quicker
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.design.intensity import PredictedIntensity
@@ -151,7 +151,10 @@ def test_a_lying_part_on_which_balls_would_rest_is_tried_turned_over(
 def test_balls_that_rest_on_what_is_turned_down_later_are_no_warning(
     poses: dict[Pose | None, Proposal],
 ) -> None:
-    over = turned_over(poses["lying"])
+    lying = poses["lying"]
+    before = f"{lying.reasons['part.rotate_deg']}{NOT_OVER}: by a pilot with other balls"
+    over = turned_over(replace(lying, reasons={**lying.reasons, "part.rotate_deg": before}))
+    assert over.reasons["part.rotate_deg"] == lying.reasons["part.rotate_deg"]
     assert not rests(over)
     steps = over.tables[""]["steps"]
     x, y, z = over.design.part.rotate_deg
