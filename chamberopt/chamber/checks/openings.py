@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 
 THIN = 5e-5  # m: sides of openings below it are none
+SAME_SIDE = 0.7  # cosine between walls that an edge and one inside it lie in
 
 
 class Opening(NamedTuple):
@@ -30,6 +31,7 @@ class Opening(NamedTuple):
     size: tuple[float, float]  # of the box round it in the wall, level side first [m]
     place: tuple[float, float, float]  # middle of that box, in the chamber's frame [m]
     beyond: float  # how far the part stands out, square to the wall [m]
+    way: tuple[float, float, float] = (0.0, 0.0, 1.0)  # unit vector square to the wall, outwards
 
 
 def find_openings(chamber: Chamber) -> list[Opening]:
@@ -87,8 +89,8 @@ def _opening(
         level = np.array([-out[1], out[0], 0.0]) / np.hypot(out[0], out[1])
         size = np.array([np.ptp(points @ level), np.ptp(points @ np.cross(out, level))])
     beyond = float(((chamber.part.vertices - middle) @ out).max())
-    x, y, z = map(float, middle)
-    return Opening(wall, (float(size[0]), float(size[1])), (x, y, z), beyond)
+    (x, y, z), (u, v, w) = middle.tolist(), out.tolist()
+    return Opening(wall, (float(size[0]), float(size[1])), (x, y, z), beyond, (u, v, w))
 
 
 def _out(outward: np.ndarray, joint: np.ndarray, own: np.ndarray) -> np.ndarray:
@@ -98,6 +100,7 @@ def _out(outward: np.ndarray, joint: np.ndarray, own: np.ndarray) -> np.ndarray:
 
 
 def _is_inside(one: Opening, other: Opening) -> bool:
-    """Return whether an opening lies in the box round a larger one in the same wall."""
+    """Return whether an opening lies in the box round a larger one on the same side."""
     away = np.linalg.norm(np.subtract(one.place, other.place))
-    return bool(2.0 * away < max(other.size) and min(one.size) < min(other.size))
+    is_near = 2.0 * away < max(other.size) and np.dot(one.way, other.way) > SAME_SIDE
+    return bool(is_near and min(one.size) < min(other.size))

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from shapely import Polygon
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.openings import find_openings
@@ -40,6 +41,16 @@ def test_a_bar_through_both_side_walls_and_a_post_through_the_ceiling(tmp_path: 
         assert 1e3 * np.array(one.size) == pytest.approx([12, 8], abs=1e-6)
         assert 1e3 * np.abs(one.place) == pytest.approx([30, 0, 19], abs=1e-6)
         assert 1e3 * one.beyond == pytest.approx(20)
+
+
+def test_a_smaller_opening_in_the_wall_opposite_is_one_of_its_own(tmp_path: Path) -> None:
+    """A leaf wider than the chamber is long, 40 mm wide at one wall and 36 mm at the other."""
+    outline = [(-31.0, -18.0), (31.0, -20.0), (31.0, 20.0), (-31.0, 18.0)]
+    leaf = trimesh.creation.extrude_polygon(Polygon(outline), 3.0)
+    large, small = find_openings(chamber_of(tmp_path, leaf))
+    assert 1e3 * large.place[0] == pytest.approx(30.0, abs=1e-6)
+    assert 1e3 * small.place[0] == pytest.approx(-30.0, abs=1e-6)
+    assert small.size[0] < large.size[0]
 
 
 def test_a_plate_that_closes_the_chamber_leaves_one_opening(tmp_path: Path) -> None:
