@@ -50,8 +50,9 @@ from chamberopt.geometry.faces import Faces
 MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
 SEEN_OUT = 1e-3  # m by which a part stands out of a side
 MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area over the largest
-# Flat faces looked at for jaws; least area of each [m²]; of two, share of all that stands out.
-MOST_FLAT, LEAST_JAW, LEAST_OF_ALL = 20, 30e-6, 0.15
+# Flat faces looked at for jaws; least area of each [m²]; of two, share of all that stands out, and
+# how far apart they are over the part's size: no vice takes a shaft by its ends.
+MOST_FLAT, LEAST_JAW, LEAST_OF_ALL, JAWS_OPEN = 20, 30e-6, 0.15, 0.8
 MOST_HOLDERS = 6  # that are tried
 CLEAR = 1.5  # distance of a mask from the target, over the diameter of a ball
 # Share of the target that a holder may keep from the balls; where no other holds the part.
@@ -163,6 +164,7 @@ def _flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray)
     )
     largest = np.argsort(-free, kind="stable")[:MOST_FLAT]
     best, text = LEAST_JAW, ""
+    longest = float(np.ptp(vertices, axis=0).max())
     for k, one in enumerate(largest):
         for other in largest[k + 1 :]:
             area = float(min(free[one], free[other]))
@@ -171,7 +173,8 @@ def _flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray)
             if is_little or area <= best or ways[0] @ ways[1] > -np.cos(np.radians(FLAT_DEG)):
                 continue
             places = faces.place(int(one)), faces.place(int(other))
-            if ways[0] @ (places[0] - places[1]) <= 0.0:  # the sides of a slot
+            apart_by = ways[0] @ (places[0] - places[1])
+            if not 0.0 < apart_by < JAWS_OPEN * longest:  # the sides of a slot, or its far ends
                 continue
             best = area
             text = "jaws on its flat faces that look to " + " and ".join(

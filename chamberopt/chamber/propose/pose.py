@@ -200,7 +200,8 @@ def pose_in_words(mesh: PartMesh, known: Sequence[Surface], turns: Turns) -> str
     words += level[:1]
     if not words:
         tilted = [f"{name} tilted by {min(t, 180.0 - t):.3g} degrees" for name, t in tilts.items()]
-        words.append(tilted[0] if tilted else "no flat face level")
+        turned = [f"{turns[k]:.4g} degrees about {'xy'[k]}" for k in (0, 1) if turns[k]]
+        words.append(tilted[0] if tilted else f"turned by {', then '.join(turned)}")
     if turns[2]:
         words.append(f"turned by {turns[2]:.4g} degrees about the vertical")
     return ", ".join(words)

@@ -167,6 +167,10 @@ def test_a_pose_is_said_as_a_fixture_gives_it(
     mesh = PartMesh(1e-3 * step.vertices, step.faces, number_by_position(20), (), "", {})
     known = surfaces(mesh)
     assert pose_in_words(mesh, known, turns) == words
+    tilted = (30.0, -20.0, 0.0)  # of a part without a flat face
+    assert (
+        pose_in_words(mesh, [], tilted) == "turned by 30 degrees about x, then -20 degrees about y"
+    )
 
 
 @pytest.mark.parametrize(

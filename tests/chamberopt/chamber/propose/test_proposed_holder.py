@@ -298,6 +298,8 @@ def test_jaws_close_on_flat_faces_back_to_back(monkeypatch: pytest.MonkeyPatch) 
     }
     inner = across & (np.abs(mesh.triangles_center[:, 1]) < 16.0)
     assert _flat_jaws(1e-3 * mesh.vertices, mesh.faces, np.where(inner, area, 0.0)) == ""
+    along = np.where(np.abs(mesh.face_normals[:, 0]) > 0.9, area, 0.0)
+    assert _flat_jaws(1e-3 * mesh.vertices, mesh.faces, along) == ""  # its ends, 60 mm apart
     ball = trimesh.creation.icosphere(3, radius=20.0)
     assert _flat_jaws(1e-3 * ball.vertices, ball.faces, 1e-6 * ball.area_faces) == ""
 
