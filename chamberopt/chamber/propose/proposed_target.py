@@ -155,6 +155,7 @@ RUNNING = re.compile(r"(?<![a-z])(?:pin|journal|race|bearing|zapfen)s?(?![a-z])"
 CONFIRM = "confirm that it is what fails in use (choose another: --target)"
 BY_SIZE, BY_SHAPE = f"CHOSEN BY SIZE ALONE: {CONFIRM}", f"CHOSEN BY SHAPE: {CONFIRM}"
 AS_LARGE = 0.9  # of the largest face's area: the target takes a face as large, e.g. a blade's back
+ALL_ROUND = 0.2  # sum of a face's area vectors over its area, below which it goes all round
 PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 # Such features are at least this share of the part's area, and stand round an axis: the variances
 # of their middles along both axes of their plane differ by less than RING.
@@ -286,6 +287,7 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         return _joined(fillets, text)
     sizes = [area[one.triangles].sum() for one in faces]
     large = [one for one, size in zip(faces, sizes, strict=True) if size >= AS_LARGE * sizes[0]]
+    large = [large[0], *(one for one in large[1:] if not _is_inside(mesh, one))]
     return _joined(large, by_size("the largest between sharp edges", faces[len(large) :]))
 
 
@@ -300,6 +302,16 @@ def _is_ring(mesh: PartMesh, alike: Surface) -> bool:
     places = np.stack([np.bincount(row, weight * x) / whole for x in middle.T], axis=1)
     _, wide, widest = np.linalg.eigvalsh(np.cov(places.T, bias=True))
     return len(numbers) > 2 and bool(widest - wide < RING * widest)
+
+
+def _is_inside(mesh: PartMesh, face: Surface) -> bool:
+    """Return whether a face is the inside of a tube, which looks at itself all round."""
+    triangles = mesh.triangles[face.triangles]
+    vectors, middle = area_vectors(mesh.vertices, triangles), mesh.vertices[triangles].mean(axis=1)
+    size = np.linalg.norm(vectors, axis=1)
+    out = middle - np.average(middle, axis=0, weights=size)
+    is_round = np.linalg.norm(vectors.sum(axis=0)) < ALL_ROUND * size.sum()
+    return bool(is_round and np.einsum("ij,ij->", out, vectors) < 0.0)
 
 
 def _faces(mesh: PartMesh) -> list[Surface]:

@@ -56,6 +56,18 @@ def test_a_study_takes_what_is_proposed(
     assert ranges["shot.mass_g"].high <= min(10000.0, 20000e3 * ball_mass)
 
 
+def test_the_inside_of_a_tube_is_no_back_of_its_outside(tmp_path: Path) -> None:
+    """Its faces are as large to a tenth, as are those of a plate, of which both are the target."""
+    trimesh.creation.annulus(29.0, 30.0, 100.0, sections=64).export(tmp_path / "tube.stl")
+    trimesh.creation.box((40, 30, 5)).subdivide().export(tmp_path / "plate.stl")
+    for name, radius in (("tube", 29.9e-3), ("plate", 0.0)):
+        mesh = read_part(tmp_path / f"{name}.stl", "mm")
+        target = propose_target(mesh, surfaces(mesh), [])
+        middle = mesh.vertices[mesh.triangles[target.triangles]].mean(axis=1)
+        assert np.hypot(*middle[:, :2].T).min() > radius - 1e-4
+    assert {-1.0, 1.0} == {*np.sign(middle[:, 2])}
+
+
 FEW_BALLS = {"": SimpleNamespace(shot=SimpleNamespace(count=100, diameter=1e-3))}
 
 
