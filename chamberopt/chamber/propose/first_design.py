@@ -44,6 +44,7 @@ from chamberopt.chamber.propose.proposal import (
     faults,
     is_capped,
     nested,
+    touched_share,
 )
 from chamberopt.chamber.propose.proposed_arbor import (
     RPM,
@@ -86,6 +87,7 @@ from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import BY_SIZE, METRES_PER
 from chamberopt.geometry.triangles import rotation_matrix
 
+LEAST_TOUCHED = 0.02  # share of the target that balls which are wished for have to touch
 REACHES = 0.95  # of a part's length, from which on a target reaches both of its ends
 AT_WALL = 2.0  # ball diameters from the target to the wall through which its end goes out
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
@@ -344,7 +346,20 @@ def _proposed(
                 made, floor = other, its_floor
     made = padded(masked(made, floor, bores, wanted.shop), floor, target, wanted.shop)
     made = only_touched(made, floor, wanted.shop)
+    if wanted.ball_mm is not None and touched_share(made) < LEAST_TOUCHED:
+        raise InputError(_too_large(made, shop.stock_mm(shot)))
     return replace(made, reasons={**made.reasons, **_room_reason(made, floor)})
+
+
+def _too_large(made: Proposal, stock_mm: Sequence[float]) -> str:
+    """Return a message on wished balls that touch none of the target, and which would."""
+    given = made.tables["shot"]["diameter_mm"]
+    fits = fit_sizes(made.chamber.part, [1e-3 * one for one in sorted(stock_mm)])
+    most = max(one.touched for one in fits)
+    largest = [1e3 * one.diameter for one in fits if one.touched >= max(0.5 * most, LEAST_TOUCHED)]
+    remedy = f"give {largest[-1]:g} or smaller" if largest else "no size in stock does; --target"
+    touches = f"but such balls touch {touched_share(made):.0%} of the target"
+    return f"--ball-mm: given {given:g}, {touches}: {remedy}"
 
 
 def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:

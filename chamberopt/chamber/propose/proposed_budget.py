@@ -211,7 +211,8 @@ def _said_of_treatment(found: Measured, treatment: float, coverage_percent: floa
     spread = f" ± {rounded(found.spread, 1)}" if math.isfinite(found.spread) else ""
     what = "95 % of the target is 98 % covered"
     if not found.places:
-        what = "the target is 98 % covered ON AVERAGE (places are out of reach or not resolved)"
+        out = "places are out of reach or not resolved"
+        what = f"the target has the dents of 98 % coverage ON AVERAGE ({out})"
     friction = " at the slow end of friction" if found.friction else ""
     more = f", times {LAGGING:g}"
     if found.places:

@@ -115,6 +115,10 @@ def test_new_writes_a_design_and_a_study_that_are_accepted(
         (["--shot", "glass"], "--shot: given 'glass'; the hardness of these balls is not known"),
         (["--unit", "m"], "with --unit = 'm' the part measures"),
         (["--ball-mm", "900"], "--ball-mm: given 900; allowed: from 0.1 to 20 mm"),
+        (
+            ["--ball-mm", "14", "--target", "FILLETS", "--no-pilot"],
+            "--ball-mm: given 14, but such balls touch 0% of the target: give 6 or smaller",
+        ),
         (["--shop", "nowhere.toml"], "nowhere.toml: no such shop file"),
         (["--intensity", "0.15-0.20"], "--intensity: given '0.15-0.20'; allowed: a range such as"),
         (["--intensity", "0.006-0.010A"], "0.006 in are 0.15 mm"),

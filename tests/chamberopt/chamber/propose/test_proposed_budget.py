@@ -68,7 +68,7 @@ def test_the_treatment_time_is_rounded_up_and_says_what_it_rests_on() -> None:
     assert budget.search_time == pytest.approx(REPLICAS * budget.time, rel=0.5)
     of_mean = propose_budget(PILOT._replace(places=False, friction=False))
     said = of_mean.reasons["process.treatment_time_s"]
-    assert "covered ON AVERAGE" in said
+    assert "has the dents of 98 % coverage ON AVERAGE" in said
     assert "friction" not in said
     assert of_mean.treatment == 540.0
     assert of_mean.search_time == REPLICAS * of_mean.time
