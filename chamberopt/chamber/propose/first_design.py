@@ -93,8 +93,7 @@ AT_WALL = 2.0  # ball diameters from the target to the wall through which its en
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
-# Balls for aluminium and for an alloy of implants, which a word of its name tells.
-CERAMIC, IMPLANT = "zirconia", "ELI"
+CERAMIC = "zirconia"  # for metals on which steel leaves iron
 # Least hardness of steel balls over the part's. A part as hard as they are is dented less: in
 # pilots of a gear of 650 HB tungsten carbide left 9 times the dents.
 HARDER = 1.25
@@ -105,7 +104,7 @@ IRON = {
     "AMS-S-13165), or ceramic balls, such as --shot zirconia",
     "titanium": "STEEL LEAVES IRON on titanium: decontaminate, or ceramic balls, such as --shot "
     "zirconia (no source read)",
-    "cobalt": "STEEL LEAVES IRON on cobalt, an alloy of implants: decontaminate, or ceramic balls, "
+    "cobalt": "STEEL LEAVES IRON on cobalt, as of implants: decontaminate, or ceramic balls, "
     "such as --shot zirconia (no source read)",
 }
 ON_STAINLESS = (
@@ -380,7 +379,6 @@ def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
     hardness = alloy(part).hardness_HB
     metal, is_stainless = alloy(part).metal, alloy(part).stainless
     spoiled = metal if metal in IRON else "stainless steel" if is_stainless else ""
-    spoiled = "an alloy of implants" if IMPLANT in part.split() else spoiled
     if not name and spoiled and shop.has(CERAMIC):
         return CERAMIC, f"steel leaves iron on {spoiled}"
     if name or (ball(STEEL).hardness_HB or 0.0) >= HARDER * hardness or not shop.has(HARD):
