@@ -11,12 +11,15 @@ from typing import Any, NamedTuple
 import tomlkit
 
 from chamberopt.chamber.propose.proposal import Proposal
-from chamberopt.chamber.propose.proposed_balls import MANY
+from chamberopt.chamber.propose.proposed_balls import MANY, MISSED
+from chamberopt.chamber.propose.proposed_budget import LONG
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.proposed_mask import LeftOut
 from chamberopt.chamber.propose.proposed_target import Surface
+from chamberopt.chamber.propose.quicker import HALF
 from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import AIMS
+from chamberopt.common.number_text import rounded
 from chamberopt.design.almen_strip import USUAL_K, USUAL_K_LOG_SD
 from chamberopt.design.load import Design, with_paths_from
 
@@ -106,7 +109,7 @@ def to_settle(proposal: Proposal, left_out: Sequence[LeftOut]) -> list[str]:
 
     said = _clauses_of(proposal)
     found = [one for key in sorted(said, key=place) for one in said[key][1]]
-    found += _many_balls(proposal)
+    found += [*_many_balls(proposal), *_quicker_balls(proposal)]
     for one in left_out:
         keys = " and ".join(f"part.target.{key}" for key in one.keys)
         many = "" if len(one.keys) > 1 else "s"
@@ -124,6 +127,19 @@ def _many_balls(proposal: Proposal) -> Iterator[str]:
         fewer = (one for one in proposal.trials if 1e-3 * one.ball_mm > size and one.count < count)
         larger = [f": {one.ball_mm:g} mm would serve {one.fit.served:.0%}" for one in fewer]
         yield f"MANY BALLS, {count:,}, to be dosed and sorted{''.join(larger[:1])}"
+
+
+def _quicker_balls(proposal: Proposal) -> Iterator[str]:
+    """Yield which balls that pilots compared take less than half of a long time, if some do."""
+    times = {one.ball_mm: one.time_to_98 or math.inf for one in proposal.trials if one.is_of_places}
+    fits = {one.ball_mm: one.fit for one in proposal.trials}
+    ball = proposal.tables["shot"]["diameter_mm"] if times else 0.0
+    if not LONG < times.get(ball, 0.0) < math.inf:
+        return
+    as_good = [one for one in times if fits[one].touched >= fits[ball].touched - MISSED]
+    best = min(as_good, key=times.__getitem__)
+    if times[best] < HALF * times[ball]:
+        yield f"QUICKER BALLS: of {best:g} mm, by pilots about {rounded(times[best], 2)} s"
 
 
 def design_text(proposal: Proposal, folder: Path, left_out: Sequence[LeftOut] = ()) -> str:

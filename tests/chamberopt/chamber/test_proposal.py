@@ -235,6 +235,7 @@ def test_what_faces_away_is_offered_for_leaving_out(
         chamber=SimpleNamespace(part=posed, steps=()),
         tables={"part": {"mesh": str(tmp_path / "gear.obj")}, "part.target": target.keys},
         reasons={},
+        trials=(),
     )
     away, hidden, sharp = find_left_out(made)
     assert sharp.text.startswith("SHARP EDGES")
@@ -289,7 +290,7 @@ def test_names_cannot_write_into_the_design(tmp_path: Path) -> None:
     tables = {"part": {"mesh": str(tmp_path / f"{bad}.stl")}, "part.target": target.keys}
     reasons = {"part.target": target.reason}
     design = SimpleNamespace(in_steps=FEW_BALLS)
-    made = SimpleNamespace(tables=tables, reasons=reasons, known=known, design=design)
+    made = SimpleNamespace(tables=tables, reasons=reasons, known=known, design=design, trials=())
     text = design_text(made, tmp_path)
     written = {"part": {"mesh": f"{bad}.stl", "target": {"surface": [bad]}}}
     assert tomllib.loads(text) == written

@@ -55,6 +55,25 @@ def test_balls_that_are_many_are_told_with_what_pilots_say_of_larger_ones(made: 
         assert told == f", {count:,}, to be dosed and sorted{more}."
 
 
+@pytest.mark.parametrize(
+    ("seconds", "touched", "is_told"),
+    [(3100.0, 0.99, True), (20000.0, 0.99, False), (3100.0, 0.9, False)],
+)
+def test_balls_that_are_much_quicker_than_a_long_time_are_told(
+    made: Proposal, seconds: float, touched: float, is_told: bool
+) -> None:
+    ball = made.tables["shot"]["diameter_mm"]
+    fit = SizeFit(1e-3 * ball, 0.99, 0.93, True, 0.0, 100)
+    taken = BallTrial(ball, 20.0, 1200, 1, fit, 27000.0, True, None, "")
+    other = replace(
+        taken, ball_mm=ball + 1.0, time_to_98=seconds, fit=replace(fit, touched=touched)
+    )
+    unknown = replace(taken, ball_mm=ball + 2.0, time_to_98=None)
+    matters = proposal_in_words(replace(made, trials=(taken, other, unknown)), []).matters
+    told = [one.text for one in matters if one.mark == "QUICKER BALLS"]
+    assert told == [f": of {ball + 1:g} mm, by pilots about 3100 s."] * is_told
+
+
 def test_the_balls_that_pilots_compared_are_one_table(made: Proposal) -> None:
     """Each row has what is known of it: a time of places or on average, or why no pilot ran."""
     assert proposal_in_words(made, []).trials is None
