@@ -7,13 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
-from manifold3d import CrossSection, Manifold
+from manifold3d import CrossSection, Manifold, OpType
 
 from chamberopt.chamber.propose import held_proposal
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.held_proposal import _flat_jaws
 from chamberopt.chamber.propose.proposal import Wanted
-from chamberopt.chamber.propose.proposed_end import held_end
+from chamberopt.chamber.propose.proposed_end import bare_end, held_end
 from chamberopt.chamber.propose.proposed_holder import HolderChoice, end_holder, holder_choices
 from chamberopt.chamber.propose.proposed_mask import find_left_out
 from chamberopt.chamber.propose.proposed_target import WHOLE, Surface, Target, apart
@@ -212,6 +212,30 @@ def test_a_part_that_is_all_target_is_held_by_its_slimmer_end() -> None:
     assert 8.5 < holder.keys["grip_mm"] <= 10.5 - 1e3 * BALL
     assert held_end(mesh, end.target, (0.0, 0.0, 0.0)) is None  # not all of it is target
     assert held_end(mesh, whole, (30.0, 0.0, 0.0)) is None  # no axis of the file is upright
+
+
+@pytest.mark.parametrize(("prongs", "is_end"), [(1, True), (2, False)])
+def test_an_end_in_several_pieces_is_no_end(prongs: int, is_end: bool) -> None:
+    """Prongs of 40 x 10 x 10 mm along x, 30 mm apart, as the coils of a spring that lies."""
+    prong = Manifold.cube((40, 10, 10)).translate([-20, -5, -5])
+    both = [prong.translate([0, 30 * k, 0]) for k in range(prongs)]
+    body = solid(Manifold.batch_boolean(both, OpType.Add)).subdivide_to_size(3.0)
+    count = len(body.faces)
+    triangles = body.faces.astype(np.int32)
+    mesh = PartMesh(1e-3 * body.vertices, triangles, number_by_position(count), (), "", {})
+    whole = Target(WHOLE, np.ones(count, dtype=bool), "all")
+    assert (held_end(mesh, whole, (0.0, 90.0, 0.0)) is not None) == is_end
+    part = Target(WHOLE, body.triangles_center[:, 0] < 0.0, "")
+    assert (bare_end(mesh, part, (0.0, 90.0, 0.0)) is not None) == is_end
+
+
+def test_a_part_whose_end_is_not_held_keeps_its_whole_target(tmp_path: Path) -> None:
+    """A ball, which has no end that jaws enclose."""
+    trimesh.creation.icosphere(subdivisions=3, radius=12.0).export(tmp_path / "ball.stl")
+    made = propose(tmp_path / "ball.stl", Wanted("mm"), lambda _: [])
+    assert "NOTHING HOLDS THE PART" in made.reasons["chamber.height_mm"]
+    assert "box_mm" not in made.tables["part.target"]
+    assert made.chamber.part.target.all()
 
 
 @pytest.mark.parametrize("side", ["FLANGE", "BORE"])
