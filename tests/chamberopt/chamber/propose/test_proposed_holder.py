@@ -59,6 +59,28 @@ def test_a_target_on_top_leaves_the_sides() -> None:
     assert not choices_of(block, np.ones(len(up), dtype=bool))
 
 
+@pytest.mark.parametrize(
+    ("wide", "y", "holds"), [(20.0, 0.0, True), (20.0, 45.0, False), (2.5, 0.0, False)]
+)
+def test_no_rod_stands_on_a_narrow_face_or_far_from_the_middle(
+    wide: float, y: float, holds: bool
+) -> None:
+    """A plate of 200 x 120 x 4 mm with a rib on it: balls peen all but the rib's top."""
+    plate = Manifold.cube((200, 120, 4)).translate([-100, -60, 0])
+    body = solid(plate + Manifold.cube((100, wide, 20)).translate([-50, y - 0.5 * wide, 0]))
+    assert bool(choices_of(body, body.triangles_center[:, 2] < 19.0)) == holds
+
+
+@pytest.mark.parametrize(("sides", "holds"), [(8, True), (32, False)])
+def test_no_rod_stands_on_a_facet_of_a_round(sides: int, holds: bool) -> None:
+    """A bar of 80 mm across whose lower half is peened: of 8 sides, or round but for its facets."""
+    bar = Manifold.cylinder(60, 40, circular_segments=sides).rotate([0, 0, 180 / sides])
+    body = solid(bar.rotate([90, 0, 0]))
+    aside = np.abs(body.face_normals[:, 1]) > 0.5
+    up = body.face_normals[:, 2] > 0.9
+    assert bool(choices_of(body, aside | ~up)) == holds
+
+
 def test_a_shaft_gets_a_collar_up_to_where_it_widens() -> None:
     """A disc of 60 x 10 mm on whose top a shaft of 12 x 20 mm stands: 0.4 of 30 mm are enclosed."""
     body = solid(
