@@ -100,8 +100,8 @@ class Faces:
             angle: between the normals of the face and of what belongs to the same round [degrees].
         """
         near = self._normal @ self.normal(face) > np.cos(np.radians(angle))
-        links = self._neighbours[near[self._neighbours].all(axis=1)]
-        piece = connected_pieces(*links.T, len(near))[1]
+        one, two = self._neighbours[near[self._neighbours].all(axis=1)].T
+        piece = connected_pieces(one, two, len(near))[1]
         own = piece[self.of_triangle == face][0]
         return bool(self._weight[piece == own].sum() > 2.0 * self.area[face])
 
