@@ -32,7 +32,8 @@ class Faces:
         self, vertices: np.ndarray, triangles: np.ndarray, border: float | np.ndarray
     ) -> None:
         normal = unit_vectors(area_vectors(vertices, triangles))
-        one, two = (side_pairs(triangles) // 3).T
+        self._neighbours = side_pairs(triangles) // 3  # (e, 2)
+        one, two = self._neighbours.T
         if isinstance(border, np.ndarray):
             smooth = border[one] == border[two]
         else:
@@ -88,6 +89,21 @@ class Faces:
         """
         length = np.linalg.norm(self.area_vectors, axis=1)
         return np.asarray(length > np.cos(np.radians(angle)) * self.area)
+
+    def is_facet(self, face: int, angle: float) -> bool:
+        """Return whether a flat face is a facet of a round surface, as of a scan.
+
+        Round it the surface then goes on for more than the face's own area before it turns away.
+        Beside a flat face with rounded edges there is less.
+
+        Args:
+            angle: between the normals of the face and of what belongs to the same round [degrees].
+        """
+        near = self._normal @ self.normal(face) > np.cos(np.radians(angle))
+        one, two = self._neighbours[near[self._neighbours].all(axis=1)].T
+        piece = connected_pieces(one, two, len(near))[1]
+        own = piece[self.of_triangle == face][0]
+        return bool(self._weight[piece == own].sum() > 2.0 * self.area[face])
 
     def alike(self, face: int) -> np.ndarray:
         """Return marks (count,) of the faces that are congruent with the face of number `face`.

@@ -136,6 +136,13 @@ def tetrahedron_volumes(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarr
     return np.asarray(np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0)
 
 
+def centre_of_mass(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the centre of mass (3,) [m] of the solid that a closed surface encloses."""
+    middle, volume = vertices.mean(axis=0), tetrahedron_volumes(vertices, triangles)
+    offsets = (vertices[triangles] - middle).sum(axis=1) / 4.0
+    return np.asarray(middle + volume @ offsets / volume.sum())
+
+
 def winding_number(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Return the winding number (p,) of a closed surface (m, 3, 3) around each point (p, 3).
 

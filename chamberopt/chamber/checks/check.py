@@ -21,6 +21,7 @@ from chamberopt.chamber.checks.gaps import (
     MIN_MISSED_SHARE,
     find_ledges,
     gap_warnings,
+    gutter_warnings,
     pocket_warnings,
     surface_warnings,
 )
@@ -104,11 +105,18 @@ def warnings(design: Design, chamber: Chamber) -> list[str]:
     )
 
 
-def _wall_warnings(design: Design, chamber: Chamber, reach: Reach) -> list[str]:
-    """Return warnings about gaps and pockets, from where the shot reaches."""
+def _wall_warnings(
+    design: Design, chamber: Chamber, reach: Reach, turned_down: np.ndarray | None = None
+) -> list[str]:
+    """Return warnings about gaps, pockets and gutters, from where the shot reaches.
+
+    Args:
+        turned_down: as of `find_ledges`.
+    """
     turns = design.effects.part_turn is not None
     gaps = gap_warnings(reach, chamber, design.shot.diameters, turns)
-    return [*gaps, *pocket_warnings(reach, chamber)]
+    gutters = gutter_warnings(design, chamber, reach, turned_down)
+    return [*gaps, *pocket_warnings(reach, chamber), *gutters]
 
 
 def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
@@ -128,7 +136,7 @@ def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
         balls.add(f"{1e3 * reach.diameter:g}")
         turned_down = down.sum(axis=0) > now  # what looks down in another step
         first = first_warnings(one, room, reach.mesh, False, turned_down)
-        texts = [*_wall_warnings(one, room, reach), *first]
+        texts = [*_wall_warnings(one, room, reach, turned_down), *first]
         if max(one.shot.diameters) == finest:
             texts += fillet_warnings(reach, room, finest)
         share = reached_share(reach, room.on_target)

@@ -1,7 +1,12 @@
 """Warnings about shapes that keep the shot from the surface, each with a position and a remedy.
 
 Such shapes are gaps in which balls jam, gaps too narrow for a ball, pockets behind a narrow mouth,
-and hollows sharper than a ball.
+hollows sharper than a ball, and level faces and gutters on which balls come to rest.
+
+A ball rests in a gutter between faces with unit normals n1 and n2 into the room if both carry it,
+a n1 + b n2 = z with a and b above 0, and their common line is level. With c = n1 n2 that is
+a = (n1z - c n2z) / (1 - c²), and b likewise. A ball of radius R touches each face at R / t from
+where they would meet, t = sqrt((1 + c) / (1 - c)) the tangent of half the angle between them.
 """
 
 from __future__ import annotations
@@ -12,7 +17,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.build import TARGET, selection_of
-from chamberopt.chamber.checks.jams import JamGap, clusters, gaps_in_reach, jam_gaps, sides_of_gap
+from chamberopt.chamber.checks.jams import (
+    MAX_COSINE,
+    JamGap,
+    clusters,
+    gaps_in_reach,
+    jam_gaps,
+    sides_of_gap,
+)
 from chamberopt.chamber.checks.place_names import (
     CEILING,
     SONOTRODE,
@@ -23,9 +35,15 @@ from chamberopt.chamber.checks.place_names import (
 )
 from chamberopt.chamber.largest_ball import TouchPoints
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
-from chamberopt.common.number_text import percent
+from chamberopt.common.number_text import percent, plain
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL
-from chamberopt.geometry.triangles import area_vectors, connected_pieces, sides_of
+from chamberopt.geometry.triangles import (
+    area_vectors,
+    connected_pieces,
+    sides_of,
+    unit_normals,
+    unit_vectors,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -302,6 +320,50 @@ def find_ledges(
         )
         found.append(Ledge(message, level))
     return found
+
+
+# Of a gutter: balls up to so many times as large show where it is; least share of a ball's weight
+# on each of its faces, as on a wall beside a face that falls to it by a degree; steepest slope.
+GUTTER_BALLS, CARRIED, LEVEL_LINE = 1.3, 0.02, 0.02
+
+
+def gutter_warnings(
+    design: Design, chamber: Chamber, reach: Reach, turned_down: np.ndarray | None = None
+) -> list[str]:
+    """Return a warning if balls can come to rest between the part and a wall beside it.
+
+    Args:
+        turned_down: as of `find_ledges`.
+    """
+    shot, touches = design.shot, reach.touches
+    if not design.effects.gravity or design.effects.part_turn is not None:
+        return []
+    of_part = chamber.tags == TAG_PART
+    wall = ~of_part & (chamber.tags != TAG_SONOTRODE)
+    if turned_down is not None:
+        of_part[of_part] = ~turned_down[chamber.source[of_part]]
+    radius = 0.5 * shot.diameter
+    between = of_part[touches.triangle] & wall[touches.obstacle] & (touches.obstacle >= 0)
+    between &= reach.reached & (touches.cosine > MAX_COSINE) & (touches.cosine < 0.0)
+    between &= (touches.radius >= radius) & (touches.radius < GUTTER_BALLS * radius)
+    rows = np.flatnonzero(between)
+    corners = chamber.vertices[chamber.triangles[touches.obstacle[rows]]]
+    one, two, cosine = touches.normal[rows], -unit_normals(corners), touches.cosine[rows]
+    carried = np.minimum(one[:, 2] - cosine * two[:, 2], two[:, 2] - cosine * one[:, 2])
+    line = unit_vectors(np.cross(one, two))[:, 2]
+    rests = (carried > CARRIED * (1.0 - cosine**2)) & (np.abs(line) < LEVEL_LINE)
+    rows, cosine = rows[rests], cosine[rests]
+    wide = (GUTTER_BALLS - 1.0) * radius * np.sqrt((1.0 - cosine) / (1.0 + cosine))
+    length = float((touches.area[rows] / wide).sum())
+    if length < max(1.0, FEW * shot.count) * shot.diameter:
+        return []
+    name = surface_names(chamber)[touches.obstacle[rows[0]]]
+    return [
+        f"balls can come to rest on the part in the gutter between it and {name}, where both fall "
+        f"towards each other: about {plain(1e3 * length, 2)} mm long, one place at "
+        f"{one_of(touches.centre[rows], touches.area[rows])} in the chamber's frame; lower the "
+        "ceiling to it, turn the part (part.rotate_deg), or move the wall away from its slope"
+    ]
 
 
 def _in_hollows(chamber: Chamber, upward: np.ndarray, downward: np.ndarray) -> np.ndarray:

@@ -146,6 +146,8 @@ def propose(
         return _lying(path, wanted, mesh, known, target, turns, pose_reason, bool(asked))
     end = None if asked else held_end(mesh, target, turns)
     made = _proposed(path, wanted, mesh, known, target, turns, pose_reason, end)
+    if end is not None and "holder" not in made.tables:  # nothing holds the end: it is peened too
+        return _proposed(path, wanted, mesh, known, target, turns, pose_reason, None)
     if asked or wanted.pose or end is not None or not hangs_by_a_face(made):
         return made
     end = held_end(mesh, target, made.design.part.rotate_deg, of_any=True)
@@ -193,6 +195,8 @@ def _lying(
         made = _proposed(path, wanted, mesh, known, target, turns, reason, lying)
         if end is not None or keeps_target or not whole or is_firm(made):
             break
+    if end is not None and "holder" not in made.tables:
+        made = _proposed(path, wanted, mesh, known, target, turns, reason, None)
     # Balls that rest on the part speak against a pose, not against what holds it there.
     if by_root is not None and rests(made) and faults(by_root) <= faults(made):
         return by_root

@@ -23,6 +23,7 @@ from chamberopt.geometry.outline import (
 from chamberopt.geometry.triangles import (
     area_vectors,
     areas,
+    centre_of_mass,
     rotation_matrix,
     sides_of,
     unit_vectors,
@@ -41,6 +42,9 @@ BESIDE, OPENING = 2.0, 0.5
 # To the narrowest flanges that close on the part no worse than the widest: step of their diameter,
 # and width of the rim that has to lie on it, so that no hole ends right beneath.
 WIDER_MM, RIM_MM = 0.5, 1.0
+# What stands on a part or goes through it carries it near its centre of mass: largest distance of
+# its axis from there over the part's size that way.
+CENTRED = 0.25
 UPRIGHT, LEVEL = 0.999, 0.02  # cosines with the vertical of an axis that is upright, and level
 # A part turns about a bore's axis if its target looks the same all round: largest difference of the
 # spread of its normals over their mean, their mean along any way, and the middle's distance from
@@ -115,8 +119,9 @@ def arbor_through(
     """Return the keys of [holder] of an arbor through a bore, and the reason for it.
 
     An upright one goes out through the ceiling, a level one through both side walls. The result is
-    None for another axis, if the arbor would hide some of the target, or if wide flanges are wanted
-    and would not close on the part all round at both ends.
+    None for another axis or one far from the part's centre of mass, if the arbor would hide some of
+    the target, or if wide flanges are wanted and would not close on the part all round at both
+    ends.
 
     Args:
         target: marks the triangles to be peened, (m,).
@@ -128,7 +133,7 @@ def arbor_through(
     frame = frame_along(bore.axis)
     corners = (mesh.vertices @ frame.T)[mesh.triangles[target]][..., :2]
     away = float(distances_in_plan(corners, (frame @ bore.point)[:2]).min(initial=math.inf))
-    if away < bore.radius + ball:
+    if away < bore.radius + ball or not carries(mesh, bore.point, bore.axis):
         return None
     keys: dict[str, Any] = {"kind": "arbor", "at": {"faces": [bore.wall]}}
     if abs(axis[2]) > UPRIGHT:
@@ -167,6 +172,18 @@ def arbor_through(
     if "diameter_mm" in keys:
         text += f"; flanges of {keys['diameter_mm']:g} mm on it lie against the part"
     return keys, text
+
+
+def carries(mesh: PartMesh, point: np.ndarray, axis: np.ndarray) -> bool:
+    """Return whether a line passes so near to a part's centre of mass that it can be held there.
+
+    Args:
+        point, axis: a point on the line [m] and its unit vector in the part file's frame, (3,).
+    """
+    offset = point - centre_of_mass(mesh.vertices, mesh.triangles)
+    offset = offset - (offset @ axis) * axis
+    away = float(np.linalg.norm(offset))
+    return away * away <= CENTRED * float(np.ptp(mesh.vertices @ offset))
 
 
 def _depth_of_seat(bore: Bore, mesh: PartMesh, radius: float, even: float) -> float:

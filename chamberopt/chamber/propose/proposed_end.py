@@ -28,10 +28,17 @@ from chamberopt.chamber.propose.proposed_target import Sizes, Target
 from chamberopt.design.shapes.outlines import area_inside
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import convex_hull
-from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix, sides_of
+from chamberopt.geometry.triangles import (
+    area_vectors,
+    areas,
+    in_small_pieces,
+    rotation_matrix,
+    sides_of,
+)
 
 NEARLY_ALL = 0.95  # share of the part's area from which on its target is all of it
 END, LONG_END = 0.15, 0.25  # length of the end over the part's, the latter if no end is straight
+ONE_PIECE = 0.95  # least share of an end's area in one connected piece, which leaves out specks
 TIP, STRAIGHT = 0.25, 0.8  # of an end: near its tip, and width there over that where it begins
 ALIKE = 0.05  # difference of that from which on it decides which end is held
 UPRIGHT = 0.999  # cosine from which on an axis of the part's file is one of the chamber's
@@ -64,6 +71,9 @@ class HeldEnd(NamedTuple):
 
 def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False) -> HeldEnd | None:
     """Return the straighter or slimmer end of a part, if all of it would be peened, else None.
+
+    What lies beyond a cut is an end only if it is one piece. It is not across the coils of a spring
+    that lies.
 
     Args:
         target: the target that was proposed.
@@ -105,6 +115,8 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
     cut = 1e3 * float(own.max() - share * length if is_top else own.min() + share * length)
     middle = 1e3 * mesh.vertices[mesh.triangles].mean(axis=1)[:, axis]
     of_end = middle > cut if is_top else middle < cut
+    if not _is_one_piece(mesh, of_end):
+        return None
     box = box_beyond(mesh, axis, not is_top, cut)
     keys = {**target.keys, "box_mm": box, "cut": True}
     reason = (
@@ -135,7 +147,16 @@ def bare_end(mesh: PartMesh, target: Target, turns: Turns) -> HeldEnd | None:
     ):
         return None
     of_end = (way * own[mesh.triangles]).min(axis=1) > cut
+    if not _is_one_piece(mesh, (way * own[mesh.triangles]).mean(axis=1) > cut):
+        return None
     return HeldEnd(target, turns, way * np.eye(3)[axis], {}, of_end)
+
+
+def _is_one_piece(mesh: PartMesh, of_end: np.ndarray) -> bool:
+    """Return whether the marked triangles (m,) of a part are connected, up to specks."""
+    least = ONE_PIECE * float(areas(mesh.vertices, mesh.triangles)[of_end].sum())
+    small = in_small_pieces(mesh.vertices, mesh.triangles, of_end, least)
+    return bool((of_end & ~small).any())
 
 
 def can_be_clamped(

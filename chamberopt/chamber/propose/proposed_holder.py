@@ -2,7 +2,8 @@
 
 An end or a root is enclosed, where it points up or aside. A bore takes an arbor. Where neither is
 free, a flat face that does not look down carries a rod along its normal, to the ceiling or to the
-side wall, or a block if it is long and a rod would be slim.
+side wall, or a block if it is long and a rod would be slim. Such a face is no facet of a round, is
+not narrow and lies near the part's centre of mass.
 
        |   holder   |
        |   _______  |         ^ axis
@@ -21,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.fixture import OF_FACE
-from chamberopt.chamber.propose.proposed_arbor import Bore, arbor_through
+from chamberopt.chamber.propose.proposed_arbor import Bore, arbor_through, carries
 from chamberopt.chamber.propose.proposed_end import UPRIGHT, box_beyond
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.meshes.part_mesh import PartMesh
@@ -37,6 +38,7 @@ from chamberopt.geometry.outline import (
 from chamberopt.geometry.triangles import area_vectors, rotation_matrix
 
 FLAT_DEG = 1.0  # largest angle in a flat face: fillets beside it are no part of it
+ROUND_DEG = 25.0  # to the facets of a round beside one of them
 MOST_FACES = 40  # flat faces that are looked at, the largest
 UP, LEVEL = 0.98, -0.1  # upward component of the normal of a face on top, and of one at the side
 HIGHER = 1e-4  # m: what is higher than a face by more stands in the way of a rod on it
@@ -54,6 +56,8 @@ WALL = 2e-3  # m: of a collar or block round an end
 THINNEST, SLIM = 2e-3, 0.15  # of a rod: m, and over the part's width: slim ones come last
 # Over the radius of a face: least seat of a rod round a hole in it, and least edge beside a target.
 SEAT, EDGE = 0.05, 0.3
+# Least width of a face that carries a part: m, or over the part's width.
+WIDE, WIDE_SHARE = 5e-3, 0.1
 # A block stands on a face of at least this length over its width, which fills its rectangle.
 LONG_FACE, FILLED = 1.6, 0.9
 OPPOSITE = 0.5  # cosine from which on a face is opposite to the target
@@ -176,7 +180,8 @@ def _on_flat_faces(
         normal = np.round(sums[face] / np.linalg.norm(sums[face]), 4) + 0.0
         up = bool(normal[2] > UP)
         axis = np.array([0.0, 0.0, 1.0]) if up else normal
-        corners = (posed @ frame_along(axis / np.linalg.norm(axis)).T)[mesh.triangles]
+        along = axis / np.linalg.norm(axis)
+        corners = (posed @ frame_along(along).T)[mesh.triangles]
         own = faces.of_triangle == face
         hull = convex_hull(corners[own].reshape(-1, 3)[:, :2])
         if hull is None:
@@ -192,6 +197,10 @@ def _on_flat_faces(
         elif holes and (block := _block(seen, float(faces.area[face]), 1.0)) is not None:
             more = len(_bolts(seen, block, holes)) > len(_bolts(seen, on_face, holes))
             on_face = block if more else on_face
+        middle = np.r_[centroid(hull), seen.level] @ frame_along(along) @ turn
+        is_wide = narrowest_rectangle(hull)[1].min() >= min(WIDE, WIDE_SHARE * width)
+        if not (is_wide and carries(mesh, middle, along @ turn)) or faces.is_facet(face, ROUND_DEG):
+            on_face = None
         for made in (_around_end(seen), on_face):
             if made is not None:
                 bolts = [] if made.is_round_an_end else _bolts(seen, made, holes)

@@ -5,6 +5,7 @@ import pytest
 import trimesh
 
 from chamberopt.geometry.triangles import (
+    centre_of_mass,
     closest_on_each,
     find_shells,
     in_small_pieces,
@@ -32,6 +33,15 @@ def test_pieces_of_a_surface_and_their_volumes() -> None:
 
     assert (np.bincount(shells) == 12).all()
     assert sorted(volumes) == pytest.approx([-8.0, 1.0])
+
+
+def test_the_centre_of_mass_is_that_of_the_solid() -> None:
+    """A cube of 8 m³ about the origin and one of 1 m³ about (5, 0, 0), however finely meshed."""
+    a = trimesh.creation.box((2, 2, 2))
+    b = trimesh.creation.box((1, 1, 1)).subdivide().apply_translation([5, 0, 0])
+    both = trimesh.util.concatenate([a, b]).apply_translation([0, 7, 0])
+    middle = centre_of_mass(np.asarray(both.vertices), np.asarray(both.faces))
+    np.testing.assert_allclose(middle, [5 / 9, 7, 0], atol=1e-12)
 
 
 def test_small_pieces_are_those_connected_by_their_corners() -> None:

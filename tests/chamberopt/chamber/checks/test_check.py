@@ -1,6 +1,7 @@
 """Facts and warnings of `check`: resting places, the part's rotation, parts outside the chamber."""
 
 import math
+import tomllib
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -8,11 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
+from manifold3d import CrossSection, Manifold
 
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.check import warnings
+from chamberopt.chamber.checks.check import shot_reach, warnings
 from chamberopt.chamber.checks.facts import describe
-from chamberopt.chamber.checks.gaps import find_ledges
+from chamberopt.chamber.checks.gaps import find_ledges, gutter_warnings
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
 from chamberopt.design.shapes import TAG_SONOTRODE
@@ -99,6 +102,39 @@ def test_slopes_are_a_note_and_no_warning() -> None:
     assert "in hollows of the wall" in found.message
     assert "none level" in found.message
     assert "z = 8 to 12 mm" in found.message
+
+
+@pytest.mark.parametrize(
+    ("slope", "room", "turned", "length"),
+    [(45, 40, 0, 60), (4, 40, 0, 60), (45, 40, 180, 0), (0.5, 40, 0, 0), (45, 80, 0, 0)],
+)
+def test_balls_rest_in_a_gutter_between_a_roof_and_the_wall(
+    tmp_path: Path, slope: float, room: float, turned: float, length: float
+) -> None:
+    """A roof of 60 x 60 mm whose eaves go out through two walls, or end before them; one lies on
+    its back. Its ridge is along y, and both gutters are as long as it.
+    """
+    rise = 30.0 * math.tan(math.radians(slope))
+    outline = CrossSection([[(-30, 0), (30, 0), (30, 4), (0, 4 + rise), (-30, 4)]])
+    made = Manifold.extrude(outline, 60.0).rotate([90, 0, 0]).to_mesh()
+    trimesh.Trimesh(made.vert_properties, made.tri_verts).export(tmp_path / "roof.stl")
+    data = tomllib.loads((DESIGNS / "plate.toml").read_text())
+    data["part"] = {"mesh": str(tmp_path / "roof.stl"), "unit": "mm"}
+    facing = {"direction": [0, 0, 1 if turned else -1], "angle_deg": [0, 60]}
+    data["part"] |= {"rotate_deg": [turned, 0, 0], "target": facing}
+    room_mm = {"length_mm": room, "width_mm": 80, "height_mm": 80, "sonotrode_distance_mm": 20}
+    data["chamber"] = {"shape": "box", **room_mm}
+    if room < 60:
+        data["holder"] = {"kind": "bore", "clearance_mm": 0.2}
+    design = validate(Design, data)
+    chamber = build_chamber(design)
+    found = gutter_warnings(design, chamber, shot_reach(design, chamber))
+    assert bool(found) == bool(length)
+    for text in found:
+        assert "come to rest on the part in the gutter between it and the wall" in text
+        told = float(text.split("about ")[1].split(" mm")[0])
+        assert told == pytest.approx(2 * length, rel=0.1)
+    assert not gutter_warnings(without_gravity(design), chamber, shot_reach(design, chamber))
 
 
 def test_nothing_comes_to_rest_under_a_lid_or_on_a_part_that_turns() -> None:

@@ -110,6 +110,17 @@ def test_an_arbor_goes_up_or_aside(turns: tuple[float, ...], axis: int | tuple[(
     assert arbor_through(bore, mesh, near & ~bore.triangles, turns, BALL) is None
 
 
+@pytest.mark.parametrize(("x", "holds"), [(0, True), (20, True), (30, False)])
+def test_an_arbor_goes_through_a_bore_near_the_middle(x: float, holds: bool) -> None:
+    """Of a bar of 100 x 30 x 10 mm: one near its end would not carry it."""
+    bar = Manifold.cube((100, 30, 10)).translate([-50, -15, 0])
+    mesh, body = part_of(bar - drum(6, 30).translate([x, 0, -10]))
+    side = np.abs(body.face_normals[:, 1]) > 0.99
+    side &= np.abs(body.triangles_center[:, 1]) > 14.0
+    (bore,) = find_bores(mesh, side)
+    assert (arbor_through(bore, mesh, side, (0, 0, 0), BALL) is not None) == holds
+
+
 @pytest.mark.parametrize("hub", [12.0, 16.0, 30.0])
 def test_flanges_are_cups_that_close_on_a_web_beside_its_hub(hub: float) -> None:
     """A disc of 12 mm with a hub as long or longer. Flanges end two balls from the rim's target, or

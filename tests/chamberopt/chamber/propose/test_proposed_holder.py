@@ -7,13 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
-from manifold3d import CrossSection, Manifold
+from manifold3d import CrossSection, Manifold, OpType
 
 from chamberopt.chamber.propose import held_proposal
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.held_proposal import _flat_jaws
 from chamberopt.chamber.propose.proposal import Wanted
-from chamberopt.chamber.propose.proposed_end import held_end
+from chamberopt.chamber.propose.proposed_end import bare_end, held_end
 from chamberopt.chamber.propose.proposed_holder import HolderChoice, end_holder, holder_choices
 from chamberopt.chamber.propose.proposed_mask import find_left_out
 from chamberopt.chamber.propose.proposed_target import WHOLE, Surface, Target, apart
@@ -57,6 +57,28 @@ def test_a_target_on_top_leaves_the_sides() -> None:
     assert all(abs(one.keys["axis"][2]) < 1e-9 for one in found)
     assert [one.keys["diameter_mm"] for one in found] == [16.0] * 4
     assert not choices_of(block, np.ones(len(up), dtype=bool))
+
+
+@pytest.mark.parametrize(
+    ("wide", "y", "holds"), [(20.0, 0.0, True), (20.0, 45.0, False), (2.5, 0.0, False)]
+)
+def test_no_rod_stands_on_a_narrow_face_or_far_from_the_middle(
+    wide: float, y: float, holds: bool
+) -> None:
+    """A plate of 200 x 120 x 4 mm with a rib on it: balls peen all but the rib's top."""
+    plate = Manifold.cube((200, 120, 4)).translate([-100, -60, 0])
+    body = solid(plate + Manifold.cube((100, wide, 20)).translate([-50, y - 0.5 * wide, 0]))
+    assert bool(choices_of(body, body.triangles_center[:, 2] < 19.0)) == holds
+
+
+@pytest.mark.parametrize(("sides", "holds"), [(8, True), (32, False)])
+def test_no_rod_stands_on_a_facet_of_a_round(sides: int, holds: bool) -> None:
+    """A bar of 80 mm across whose lower half is peened: of 8 sides, or round but for its facets."""
+    bar = Manifold.cylinder(60, 40, circular_segments=sides).rotate([0, 0, 180 / sides])
+    body = solid(bar.rotate([90, 0, 0]))
+    aside = np.abs(body.face_normals[:, 1]) > 0.5
+    up = body.face_normals[:, 2] > 0.9
+    assert bool(choices_of(body, aside | ~up)) == holds
 
 
 def test_a_shaft_gets_a_collar_up_to_where_it_widens() -> None:
@@ -212,6 +234,30 @@ def test_a_part_that_is_all_target_is_held_by_its_slimmer_end() -> None:
     assert 8.5 < holder.keys["grip_mm"] <= 10.5 - 1e3 * BALL
     assert held_end(mesh, end.target, (0.0, 0.0, 0.0)) is None  # not all of it is target
     assert held_end(mesh, whole, (30.0, 0.0, 0.0)) is None  # no axis of the file is upright
+
+
+@pytest.mark.parametrize(("prongs", "is_end"), [(1, True), (2, False)])
+def test_an_end_in_several_pieces_is_no_end(prongs: int, is_end: bool) -> None:
+    """Prongs of 40 x 10 x 10 mm along x, 30 mm apart, as the coils of a spring that lies."""
+    prong = Manifold.cube((40, 10, 10)).translate([-20, -5, -5])
+    both = [prong.translate([0, 30 * k, 0]) for k in range(prongs)]
+    body = solid(Manifold.batch_boolean(both, OpType.Add)).subdivide_to_size(3.0)
+    count = len(body.faces)
+    triangles = body.faces.astype(np.int32)
+    mesh = PartMesh(1e-3 * body.vertices, triangles, number_by_position(count), (), "", {})
+    whole = Target(WHOLE, np.ones(count, dtype=bool), "all")
+    assert (held_end(mesh, whole, (0.0, 90.0, 0.0)) is not None) == is_end
+    part = Target(WHOLE, body.triangles_center[:, 0] < 0.0, "")
+    assert (bare_end(mesh, part, (0.0, 90.0, 0.0)) is not None) == is_end
+
+
+def test_a_part_whose_end_is_not_held_keeps_its_whole_target(tmp_path: Path) -> None:
+    """A ball, which has no end that jaws enclose."""
+    trimesh.creation.icosphere(subdivisions=3, radius=12.0).export(tmp_path / "ball.stl")
+    made = propose(tmp_path / "ball.stl", Wanted("mm"), lambda _: [])
+    assert "NOTHING HOLDS THE PART" in made.reasons["chamber.height_mm"]
+    assert "box_mm" not in made.tables["part.target"]
+    assert made.chamber.part.target.all()
 
 
 @pytest.mark.parametrize("side", ["FLANGE", "BORE"])
