@@ -348,7 +348,16 @@ class Acts:
         folder = self.inside(str(asked["folder"]))
         if asked.get("seen") == version(folder):
             return {"version": asked["seen"]}
-        return candidates_answer(folder)
+        return candidates_answer(folder) | {"same": self._asking_the_same(folder)}
+
+    def _asking_the_same(self, folder: Path) -> list[str]:
+        """Return the other folders of studies that ask the same, of which one goes on with one."""
+        inputs, found = read_inputs(folder), []
+        for other in _result_folders(self._path.parent):
+            with suppress(InputError):
+                if other != folder and is_study_folder(other):
+                    found += [other] if read_inputs(other).asks_as(inputs) else []
+        return sorted(one.relative_to(self._path.parent).as_posix() for one in found)
 
     def candidate(self, asked: Any) -> dict[str, object]:
         folder, design = self.inside(str(asked["folder"])), self._file(asked).design

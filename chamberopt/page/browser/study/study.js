@@ -15,10 +15,17 @@ export function followStudy(of) {
   pair = [];
   find("study-title").textContent = folder;
   find("study-of").replaceChildren();
+  find("study-same").hidden = true;
   find("tried").textContent = find("study-sentence").textContent = "";
   find("chosen-candidate").replaceChildren(element("p", { className: "soft", textContent: "Click a point to see its numbers, and its chamber above." }));
   find("study-view").hidden = false;
   look();
+}
+
+function toStudy(other) {
+  const button = element("button", { type: "button", textContent: other });
+  button.addEventListener("click", () => followStudy(other));
+  return button;
 }
 
 function closeStudy() {
@@ -40,6 +47,8 @@ async function look() {
     if (now.candidates) {
       data = prepared(now);
       find("tried").textContent = find("study-sentence").textContent = data.sentence;
+      find("study-same").hidden = !data.same.length;
+      find("study-same").replaceChildren("Other candidates for the same question are in ", ...data.same.flatMap((other) => [toStudy(other), " "]));
       draw();
       model = await ask("/model", { folder: mine }).catch(({ message }) => ({ reason: message })); // its design may be elsewhere
       if (mine !== folder) return;
