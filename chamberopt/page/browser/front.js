@@ -49,6 +49,7 @@ async function draw(part) {
   find("place").hidden = !part;
   const drawn = part && `${part} in ${known.unit}`; // its numbers have another size in another unit
   if (drawn === drawnPart && !view.get("walls")) return;
+  view.highlight("part", null);
   for (const name of ["part", ...CHAMBER]) view.remove(name);
   drawnPart = drawn;
   if (!part) return;

@@ -162,7 +162,17 @@ class View3D {
     mesh.matrixAutoUpdate = false;
     mesh.matrix.set(r[0], r[1], r[2], s[0], r[3], r[4], r[5], s[1], r[6], r[7], r[8], s[2], 0, 0, 0, 1);
     mesh.matrixWorldNeedsUpdate = true;
+    this.#lay(name);
     this.draw();
+  }
+
+  // Put what marks a surface where the surface is.
+  #lay(name) {
+    const marked = this.get("highlight");
+    if (marked?.userData.of !== name) return;
+    marked.matrixAutoUpdate = false;
+    marked.matrix.copy(this.get(name).matrix);
+    marked.matrixWorldNeedsUpdate = true;
   }
 
   // Mark triangles of a surface, also where they are hidden; null for none.
@@ -177,9 +187,8 @@ class View3D {
     marked.material.color.set(colour);
     Object.assign(marked.material, { depthTest: false });
     marked.renderOrder = 1;
-    marked.matrixAutoUpdate = false;
-    marked.matrix.copy(mesh.matrix);
-    marked.matrixWorldNeedsUpdate = true;
+    marked.userData.of = name;
+    this.#lay(name);
   }
 
   // Names and surfaces, lines and texts.
