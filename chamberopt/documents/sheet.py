@@ -458,7 +458,7 @@ def _expected(result: Result) -> Iterator[Row]:
     wanted = result.design.process.intensity_mmA
     if wanted is None and (reason := why_no_intensity(calibration)):
         yield "", f"{reason[0].upper()}{reason[1:]}."
-    for one in answer_lines(result):
+    for one in answer_lines(result, load_start(result)):
         if one.about in ("best", "calibration", "ranges"):  # zones have their own block
             yield "", one.text
     yield "", f"± 95 % intervals. {limits_of_intervals(result)}"
