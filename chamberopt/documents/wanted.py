@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
@@ -68,6 +69,14 @@ def time_standing(design: Design, time: Estimate) -> str:
     if planned >= times * time.high:
         return MET
     return NOT_MET if planned < times * time.low else NOT_DECIDED
+
+
+def enough_time(design: Design, metrics: Mapping[str, Estimate]) -> float | None:
+    """Return the least whole time [s] that is enough by `coverage_standing`; None if not known."""
+    time = metrics.get(TIME)
+    if time is None or time.in_words or not 0.0 < time.high < math.inf:
+        return None
+    return float(math.ceil(_times(design) * time.high))
 
 
 def _times(design: Design) -> float:

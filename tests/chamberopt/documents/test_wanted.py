@@ -9,6 +9,7 @@ import pytest
 from chamberopt.common.estimate import Estimate
 from chamberopt.documents.wanted import (
     coverage_standing,
+    enough_time,
     intensity_lines,
     time_lines,
     time_text,
@@ -114,3 +115,18 @@ def test_an_intensity_that_is_certainly_outside_is_a_warning() -> None:
     (line,) = intensity_lines(a_design(250.0, wanted=(0.15, 0.2)), far)
     assert line.warns
     assert "0.15 to 0.2 mmA: outside with the whole interval; predicted 0.015 mmA" in line.text
+
+
+@pytest.mark.parametrize(("percent", "enough"), [(None, 107.0), (200.0, 213.0)])
+def test_the_least_whole_time_that_is_enough(percent: float | None, enough: float) -> None:
+    time = {"time_to_98_s": Estimate(100.0, 6.2)}
+    assert enough_time(a_design(1.0, percent), time) == enough
+    assert coverage_standing(a_design(enough, percent), time) == "met"
+    assert coverage_standing(a_design(enough - 1.0, percent), time) != "met"
+
+
+@pytest.mark.parametrize(
+    "time", [None, Estimate(9.0, math.inf), Estimate(9.0, 1.0, in_words="never")]
+)
+def test_no_time_is_enough_where_none_is_known(time: Estimate | None) -> None:
+    assert enough_time(a_design(1.0), {"time_to_98_s": time} if time else {}) is None

@@ -75,6 +75,16 @@ def test_figures_of_a_candidate_are_in_words_with_units_and_intervals(out: Path)
         candidate_answer(out, 99, design)
 
 
+def test_the_time_that_a_candidate_needs_is_offered_with_its_numbers(copy: Path) -> None:
+    design = load_design(copy.parents[1] / "design.toml")
+    rows = [json.loads(line) for line in (copy / "history.jsonl").read_text().splitlines()]
+    time = {"value": 170.2, "half_width": 6.0}
+    rewritten(copy, 0, metrics=rows[0]["metrics"] | {"time_to_98_s": time})
+    assert candidate_answer(copy, 1, design)["time"] == {"process.treatment_time_s": 177.0}
+    known = design.changed({"process.treatment_time_s": 177.0})
+    assert candidate_answer(copy, 1, known)["time"] == {}
+
+
 def test_the_model_comes_with_its_check_or_the_reason_why_there_is_none(copy: Path) -> None:
     answer = json.loads(json.dumps(model_answer(copy), allow_nan=False))
     assert not answer["reason"]

@@ -94,9 +94,7 @@ def test_its_figures_are_those_of_the_report(folder: Path) -> None:
     assert "Simulated without friction" in rows_of(smooth)["Not in these figures"][""]
 
 
-def test_what_the_best_costs_is_on_the_sheet(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_the_best_costs_is_on_the_sheet(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     result = load_result(folder)
     speed = result.metrics["mean_normal_speed_m_s"]
     faster = Estimate(2.0 * speed.value, 0.1 * speed.value)

@@ -217,12 +217,17 @@ async function choose(number) {
   const one = await ask("/candidate", { folder, number });
   if (number !== chosen) return;
   const rows = (pairs) => element("table", {}, ...pairs.map(([name, text]) => element("tr", {}, element("th", { textContent: name }), element("td", { textContent: text }))));
-  const take = element("button", { id: "take", textContent: "Take these numbers into the design" });
-  take.addEventListener("click", () => { change(one.values); say("taken: save the design, or undo", true); });
+  const taking = (id, textContent, values) => {
+    const button = element("button", { id, textContent });
+    button.addEventListener("click", () => { change(values); say("taken: save the design, or undo", true); });
+    return button;
+  };
+  const take = taking("take", "Take these numbers into the design", one.values), [time] = Object.values(one.time);
+  const timed = time ? [" ", taking("take-time", `Take them with ${time} s of peening, which are enough for it`, { ...one.values, ...one.time })] : [];
   const other = one.differs.length ? [element("p", { className: "warning", textContent: `The open design is not the one of this study: it differs in ${one.differs.slice(0, 4).join(", ")}${one.differs.length > 4 ? ` and ${one.differs.length - 4} more` : ""}. The chamber shown is that of the open design with these numbers.` })] : [];
   find("chosen-candidate").replaceChildren(element("h3", { textContent: `Candidate ${data.candidates[number - 1].name}` }),
     element("p", { textContent: `${WORDS[one.kind]}${one.reason ? `: ${one.reason}` : ""}` }), ...other,
-    rows(one.numbers), element("p", {}, take), rows(one.figures));
+    rows(one.numbers), element("p", {}, take, ...timed), rows(one.figures));
   document.body.dataset.candidate = String(number);
   show(one.values, `candidate ${number} is shown`);
 }
