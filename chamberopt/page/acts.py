@@ -35,6 +35,7 @@ from chamberopt.documents.overview import comparison_overview
 from chamberopt.documents.proposal import matter_of
 from chamberopt.documents.report import answer_section
 from chamberopt.documents.study import aim_in_words
+from chamberopt.documents.wanted import times_longer
 from chamberopt.documents.wording import value_text
 from chamberopt.page.answers import packed, part_answer, shape_answer, step_texts, surface_answer
 from chamberopt.page.checker import Checker
@@ -140,16 +141,24 @@ def _stale(result: Result, now: Design) -> str:
 def shown(folders: Sequence[Path]) -> dict[str, object]:
     """Return the 3D view of results side by side, with the answer of one or the comparison of two.
 
+    Where one does not tell the peening strength, `longer` has how many times as long a simulation
+    tells it, and this time as values of the design.
+
     Raises:
         InputError: a folder has no usable result, or the results cannot be compared.
     """
+    longer: dict[str, object] = {}
     html, content = parts_content(folders)
     if len(folders) > 1:
         first = comparison_overview(compare(folders))
     else:
         result = load_result(folders[0])
         first = answer_section(result, load_start(result))
-    return {"content": content, "html": explained(section(first, viewer) + html)}
+        if (times := times_longer(result)) > 1:
+            now = result.design.process.accuracy.simulated_time_s
+            longer = {"times": times, "values": {SIMULATED_TIME: float(f"{times * now:.4g}")}}
+    html = explained(section(first, viewer) + html)
+    return {"content": content, "html": html, "longer": longer}
 
 
 def difference(folders: Sequence[Path]) -> dict[str, str]:
@@ -165,6 +174,7 @@ def difference(folders: Sequence[Path]) -> dict[str, str]:
         return {"picture": f"data:image/png;base64,{b64encode(read_file(picture)).decode()}"}
 
 
+SIMULATED_TIME = "process.accuracy.simulated_time_s"
 MOST_FILES = 20  # versions of the design's text that are kept for the pages that read them
 STUDY_NAME = re.compile(r"\w[\w .+-]{0,100}\.toml")
 COMMANDS = ("simulate", "run", "sweep", "report", "sheet")
