@@ -1,5 +1,5 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
-import { ask, attempt, element, onPage, unpack, warning, wordsOf } from "./state.js";
+import { asLines, ask, attempt, element, onPage, unpack, warning, wordsOf } from "./state.js";
 import { followed, sinceBegin, stage } from "./steps.js";
 import { colourByState, lights, wayToTarget } from "./surfaces.js";
 
@@ -144,17 +144,17 @@ find("part").addEventListener("change", () => attempt(() => look(find("part").va
 
 // Show the command that proposes a chamber: how far it is, and in the end what it proposes.
 let drawn = 0, told = ""; // when the picture that is shown was drawn; the proposal that is shown
-function tell({ steps, seconds, lines, warnings, fault, exit, picture, result, proposal }) {
+function tell({ steps, seconds, printed, warnings, fault, exit, picture, result, proposal }) {
   find("made").hidden = false;
   find("stop").hidden = exit !== null;
   find("busy").textContent = exit !== null ? "" : sinceBegin(seconds);
   const isStopped = exit === 130, atEnd = isStopped ? ["Stopped."] : [];
   if (exit !== null || steps.length) find("progress").replaceChildren(...(exit === null ? stage(steps) : atEnd));
   find("warnings").replaceChildren(...warnings.map(warning));
-  find("printed").textContent = lines.join("\n");
-  find("printed-fold").hidden = exit === null || !lines.length;
+  find("printed").replaceChildren(...asLines(printed));
+  find("printed-fold").hidden = exit === null || !printed.length;
   find("error").hidden = !exit || isStopped;
-  find("error").replaceChildren(...fault.flatMap((words) => [...onPage(words), "\n"]));
+  find("error").replaceChildren(...asLines(fault));
   find("picture-fold").hidden = !picture;
   if (picture && picture[1] !== drawn) {
     find("picture").href = `/files/${picture[0].split("/").map(encodeURIComponent).join("/")}?${drawn = picture[1]}`;

@@ -1,5 +1,5 @@
 // Running the commands on what is saved, and writing a study from the sliders.
-import { ask, attempt, element, isUnsaved, onPage, read, say, state, wordsOf } from "./state.js";
+import { asLines, ask, attempt, element, isUnsaved, onPage, read, say, state, wordsOf } from "./state.js";
 import { bound, ends, makeFields, varied, varyOnly } from "./fields.js";
 import { bars, followed, sinceBegin } from "./steps.js";
 
@@ -94,7 +94,7 @@ let study = "";
 // Show a command that runs, by default what the server has started last, and give its exit status.
 export const follow = async (started) => (await followed(show, started))?.exit ?? null;
 
-function show({ command, result, steps, seconds, lines, exit }) {
+function show({ command, result, steps, seconds, printed, exit }) {
   if (exit !== null && command.startsWith("chamberopt new ")) return; // of the front page
   const before = study;
   study = exit === null && isStudy(command) ? result : "";
@@ -104,8 +104,8 @@ function show({ command, result, steps, seconds, lines, exit }) {
   allow();
   const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
   find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...toResult(command, result, exit));
-  find("printed").textContent = lines.join("\n");
-  find("printed-fold").hidden = !lines.length;
+  find("printed").replaceChildren(...asLines(printed));
+  find("printed-fold").hidden = !printed.length;
   if (exit) find("printed-fold").open = true;
 }
 

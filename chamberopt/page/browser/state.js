@@ -136,6 +136,7 @@ let fading = 0;
 // Text, or a message of the server: texts, and pairs of words with what they are in a file as a tip; or elements.
 export const onPage = (words) => [words].flat().map((one) => typeof one === "string" || one instanceof Node ? one
   : element("abbr", { textContent: one[0], title: one[1] }));
+export const asLines = (messages) => messages.flatMap((words) => [...onPage(words), "\n"]);
 // A warning as one line, which opens on a click.
 export const warning = (words) => element("details", { className: "warned" }, element("summary", {}, ...onPage(words)));
 export const wordsOf = (error) => error.words ?? error.message;

@@ -50,6 +50,25 @@ def test_a_command_is_named_as_the_page_has_it() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("printed", "told"),
+    [
+        ("finishing what runs, then stopping; press Ctrl-C again to stop now",
+         "finishing what runs, then stopping"),
+        ("to resume: chamberopt run fast.toml --out results/fast", ""),
+        ("results/fast: not finished; to resume it: chamberopt run fast.toml",
+         "results/fast: not finished"),
+        ("simulated at both ends (2 times the work); --no-ranges leaves them out",
+         "simulated at both ends (2 times the work)"),
+        ("and 3 more notes: --verbose shows all", "and 3 more notes"),
+        ("in the lid in place of the part, 8 mm from the sonotrode: chamberopt strip",
+         "in the lid in place of the part, 8 mm from the sonotrode"),
+    ],
+)  # fmt: skip
+def test_what_only_a_terminal_needs_is_left_out(printed: str, told: str) -> None:
+    assert on_page(printed) == ([told] if told else [])
+
+
 def test_commands_in_html_are_named_as_the_page_has_them() -> None:
     found = explained("<p>1 &lt; 2: chamberopt calibrate</p><pre>chamberopt calibrate</pre>")
     tip = '<abbr title="chamberopt calibrate">a calibration of the machine, in a terminal</abbr>'
