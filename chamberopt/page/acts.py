@@ -305,9 +305,10 @@ class Acts:
 
     def study(self, asked: Any) -> dict[str, object]:
         """Write a study file beside the design, and remove it again if it is no valid study."""
-        name, evaluations = str(asked["name"]), float(asked["evaluations"])
+        name, evaluations = str(asked["name"]).strip(), float(asked["evaluations"])
+        name += "" if not name or name.endswith(".toml") else ".toml"
         if not STUDY_NAME.fullmatch(name):
-            raise InputError(f"{name!r}: give a name of letters and digits that ends in .toml")
+            raise InputError(f"{name!r}: give a name of letters and digits")
         if not evaluations.is_integer():
             raise InputError(f"evaluations: given {evaluations:g}; give a whole number")
         file, path = self._file(asked), check_new_file(self.inside(name))

@@ -154,7 +154,7 @@ export function say(text, good = false) {
 
 // Run an act; what goes wrong is said in an element beside its button, or over the page.
 export async function attempt(act, place = null) {
-  const tell = (words) => { if (place) place.replaceChildren(...onPage(words)); else say(words); };
+  const tell = (words) => { if (!place) { say(words); return; } place.replaceChildren(...onPage(words)); if (words) place.scrollIntoView({ block: "nearest" }); };
   try { say(""); tell(""); return await act(); } catch (error) { tell(wordsOf(error)); return undefined; }
 }
 

@@ -424,11 +424,27 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     most.fill("2.5")
     most.press("Tab")
     expect(most).to_have_value("3")  # that of the design is within
+    expect(page.locator("#varied .wrong")).to_have_text(
+        "The design has 3, which is to lie between the ends."
+    )
+    least = page.locator("[aria-label='Shot mass [g], least']")
+    before = least.input_value()
+    least.fill("70")
+    least.press("Tab")
+    expect(least).to_have_value(before)
+    expect(page.locator("#varied .wrong")).to_have_text(
+        "70 is not less than 3: change the other end first."
+    )
     page.select_option("#aim", "p05_coverage")
     page.fill("#evaluations", "2")
-    page.fill("#study-name", "stopped.toml")
+    page.fill("#study-name", "design.toml")
+    page.click("#search-sliders")
+    expect(page.locator("#search-fault")).to_contain_text("design.toml")
+    expect(page.locator("#search-fault")).to_be_in_viewport()
+    page.fill("#study-name", "stopped")
     page.click("#search-sliders")
     expect(page.locator("#message")).to_contain_text("written: stopped.toml")
+    expect(page.locator("#lasts")).to_be_hidden()  # while it runs
     page.click("#stop")
     expect(page.locator("#progress")).to_contain_text("stopped", timeout=WAIT)
     page.click("#close-study")
@@ -442,8 +458,15 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     opened.tab("run")
     page.select_option("#of", "design.toml")
     expect(page.locator("#lasts")).to_be_empty()  # nothing like it was simulated yet
-    page.click("[data-command=simulate]")
+    simulate = page.locator("[data-command=simulate]")
+    page.locator('[id="process.treatment_time_s"]').evaluate("one => { one.value = 6; }")
+    page.locator('[id="process.treatment_time_s"]').dispatch_event("change")
+    expect(simulate).to_have_text("Save and simulate")
+    expect(page.locator("#search-sliders")).to_have_text("Save and search for the best")
+    simulate.click()
     expect(page.locator("#progress")).to_contain_text("finished", timeout=WAIT)
+    expect(simulate).to_have_text("Simulate")
+    assert load_design(folder / "design.toml").process.treatment_time_s == 6
     expect(page.locator("#lasts")).to_contain_text("about 5 s")
     result = json.loads((folder / "results" / "design" / "result.json").read_text())
     out = folder / "by-command"
