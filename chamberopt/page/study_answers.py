@@ -62,6 +62,7 @@ def candidates_answer(folder: Path) -> dict[str, object]:
     shown = [evaluated(one, labels[0]) for one in trials]
     numbers, best = best_so_far(shown, smaller)
     objectives = [one.objective for one in shown if one.objective]
+    best_trial = _best(trials)
     first = {
         trial.point: trial.number + 1 for trial in reversed(trials) if trial.stage != "confirm"
     }
@@ -72,6 +73,8 @@ def candidates_answer(folder: Path) -> dict[str, object]:
             "name": str(of) if of == one.number else f"{of} again",
             "kind": _kind(trial),
             "is_start": trial.number == 0 and trial.stage == "search",
+            "is_best": trial is best_trial,
+            "standing": _standing(trial, best_trial, is_finished(folder)),
             "feasible": one.feasible,
             "objective": _interval(one.objective),
             "told": labels[0].number(trial.goals[0]) if trial.goals else "",
@@ -103,6 +106,24 @@ def candidates_answer(folder: Path) -> dict[str, object]:
         "front": _front(trials) if len(labels) > 1 else [],
         "colours": COLOURS,
     }
+
+
+def _best(trials: Sequence[Trial]) -> Trial | None:
+    """Return the best trial that meets the constraints, of those that confirm if there are any.
+
+    The last confirmation of a candidate counts.
+    """
+    simulated = [one for one in trials if one.goals]
+    again = {one.point: one for one in simulated if one.stage == "confirm"}
+    feasible = [one for one in [*again.values()] or simulated if one.feasible]
+    return max(feasible, key=lambda one: one.score, default=None)
+
+
+def _standing(trial: Trial, best: Trial | None, is_over: bool) -> str:
+    """Return what a candidate is to the study, beside what became of it; "" for nothing."""
+    if trial is best:
+        return "the best" if is_over else "the best so far"
+    return "the start" if trial.number == 0 and trial.stage == "search" else ""
 
 
 def _meanings(labels: Sequence[Label]) -> list[str]:

@@ -55,6 +55,13 @@ def test_every_candidate_is_there_as_the_log_has_it(out: Path) -> None:
     )
     assert kinds.count("refused") > 0
     assert [one["is_start"] for one in answer["candidates"]].index(True) == 0
+    (best,) = (one for one in answer["candidates"] if one["is_best"])
+    confirmed = {one.point: one for one in trials if one.stage == "confirm"}.values()
+    assert best["number"] == 1 + max(confirmed, key=lambda one: one.score).number
+    assert (best["standing"], answer["candidates"][0]["standing"]) == (
+        "the best so far",
+        "the start",
+    )
     for one, trial in zip(answer["candidates"], trials, strict=True):
         assert (one["objective"] is None) == (not trial.goals)
     scores = [one.goals[0].value for one in trials if one.goals and one.stage == "search"]
