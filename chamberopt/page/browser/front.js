@@ -217,6 +217,11 @@ function besideField(text, words) {
   return true;
 }
 
+// What is wrong of a field is no longer said once the field has changed.
+for (const id of WISHES) for (const name of ["input", "change"]) find(id).addEventListener(name, () => {
+  if (find(id).hasAttribute("aria-invalid")) besideField("");
+});
+
 const ticked = () => [...find("names").querySelectorAll("input")];
 async function started(target) {
   const wishes = Object.fromEntries(WISHES.map((id) => [id, find(id).value.trim()]));

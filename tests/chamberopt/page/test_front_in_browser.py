@@ -57,6 +57,8 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             wrong = page.locator("#material + .wrong")
             expect(wrong).to_contain_text("did you mean 'Ti-6Al-4V'")
             page.fill("#material", "Ti-6Al-4V")
+            expect(wrong).to_have_count(0)  # as soon as it is corrected
+            assert page.locator("#material").get_attribute("aria-invalid") is None
             page.fill("#ball-mm", "1,2")
             page.click("#propose")
             opened.wait('data-ended="0"')
