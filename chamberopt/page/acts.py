@@ -42,7 +42,14 @@ from chamberopt.page.checker import Checker
 from chamberopt.page.duration import duration_in_words
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
-from chamberopt.page.page_words import CHOICES, amplitudes_named, balls_named, explained, on_page
+from chamberopt.page.page_words import (
+    CHOICES,
+    amplitudes_named,
+    balls_named,
+    explained,
+    names_met,
+    on_page,
+)
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
 from chamberopt.page.structure import (
@@ -481,6 +488,7 @@ def _told_of(file: EditedFile) -> dict[str, object]:
                 "mark": matter.mark.capitalize(),
                 "words": on_page(matter.text),
                 "takes": _taken(design, one),
+                "meets": names_met(matter.text),
             }
             for one, matter in zip(design.to_settle, map(matter_of, design.to_settle), strict=True)
         ],

@@ -185,6 +185,21 @@ def amplitudes_named(text: str) -> list[float]:
     return list(dict.fromkeys(map(float, _AMPLITUDE.findall(text))))
 
 
+# How `new` names what the shot meets beside the target (chamber/propose/proposed_mask.py).
+_MET = re.compile(r"the shot also meets (.+? \([^()]*\)); ")
+_MET_NAME = re.compile(r"(?:the rest of )?(.+?) \([^()]*\)(?:, |$)")
+
+
+def names_met(text: str) -> list[str]:
+    """Return the surfaces that a matter says are met beside the target; [] if others are not named.
+
+    >>> names_met("NOT MASKED: the shot also meets WEB (80 mm²), RIM (3 mm² of it); what")
+    ['WEB', 'RIM']
+    """
+    found = _MET.search(text)
+    return _MET_NAME.findall(found[1]) if found else []
+
+
 def choices(allowed: tuple[str, ...] | list[str]) -> list[tuple[str, str]]:
     """Return each allowed text with its words on the page."""
     return [(one, CHOICES.get(one, one.replace("_", " "))) for one in allowed]

@@ -274,6 +274,35 @@ def test_the_face_of_a_cad_file_lights_up_and_is_taken(opened: Page, tmp_path: P
         served.process.communicate()
 
 
+def test_names_of_the_target_are_marked(opened: Page, tmp_path: Path) -> None:
+    """A cube of two names, of which one is the target, and the other is met beside it."""
+    served = Served(tmp_path, "design.toml")
+    corners = [(x, y, z) for z in (-8, 8) for y in (-8, 8) for x in (-8, 8)]
+    sides = "1 3 4 2", "5 6 8 7", "1 2 6 5", "2 4 8 6", "4 3 7 8", "3 1 5 7"
+    lines = [f"v {x} {y} {z}" for x, y, z in corners]
+    lines += ["g WEB", f"f {sides[0]}", "g RIM", *(f"f {one}" for one in sides[1:])]
+    (tmp_path / "named.obj").write_text("\n".join(lines))
+    dropped, text = ("direction", "angle_deg", "box_mm"), (tmp_path / "design.toml").read_text()
+    kept = "\n".join(x for x in text.splitlines() if x.partition(" =")[0] not in dropped)
+    kept = kept.replace("box.stl", "named.obj").replace('surface = "all"', 'surface = "WEB"')
+    met = "NOT MASKED: the shot also meets RIM (80 mm²); what has to keep its size takes a mask"
+    (tmp_path / "design.toml").write_text(f'to_settle = ["{met}"]\n{kept}')
+    try:
+        page = Page(opened.page.context.browser, served)
+        page.tab("target")
+        web, rim = (page.page.locator("#names button", has_text=one) for one in ("WEB", "RIM"))
+        expect(web).to_have_attribute("aria-pressed", "true", timeout=WAIT)
+        expect(rim).to_have_attribute("aria-pressed", "false")
+        expect(page.page.locator("#settle li")).to_contain_text("the shot also meets RIM")
+        rim.click()
+        expect(rim).to_have_attribute("aria-pressed", "true")
+        expect(page.page.locator("#settle li")).to_contain_text("RIM is in the target now")
+        assert not page.errors
+    finally:
+        served.process.kill()
+        served.process.communicate()
+
+
 def test_a_slider_moves_and_is_undone_as_one(opened: Page) -> None:
     slider = opened.page.locator(".field", has=opened.page.locator('[id="shot.mass_g"]'))
     slider = slider.locator("input[type=range]")
