@@ -194,6 +194,29 @@ def test_the_legend_hides_a_kind_and_the_view_turns_to_an_axis(opened: Page) -> 
         page.click("#undo")
 
 
+def test_the_wheel_zooms_only_after_a_click_or_with_ctrl(opened: Page) -> None:
+    page = opened.page
+    box = page.locator("#view canvas").bounding_box()
+    far = """async () => { const { view } = await import("/browser/scene.js");
+        return view.camera.position.distanceTo(view.orbit.target); }"""
+    place, before = (box["x"] + 30, box["y"] + 400), page.evaluate(far)
+    page.click("h1, header", position={"x": 2, "y": 2})
+    for click, key in ((False, ""), (False, "Control"), (True, "")):
+        if click:
+            page.mouse.click(*place)
+        page.mouse.move(*place)
+        if key:
+            page.keyboard.down(key)
+        page.mouse.wheel(0, -200)
+        page.wait_for_timeout(200)
+        if key:
+            page.keyboard.up(key)
+        now = page.evaluate(far)
+        assert (now < 0.99 * before) == (click or bool(key))
+        before = now
+    page.locator("#view").dblclick(position={"x": 30, "y": 400})
+
+
 def test_a_switch_hides_the_chamber_as_its_legend_does(opened: Page) -> None:
     page, chamber = opened.page, opened.page.get_by_label("show the chamber")
     wall, sonotrode = (
@@ -339,6 +362,15 @@ def test_shape_and_holder_are_chosen_in_words(opened: Page) -> None:
     expect(shown("chamber.length_mm")).not_to_have_value("", timeout=WAIT)
     expect(shown("chamber.diameter_mm")).to_have_count(0)
     opened.put("chamber.length_mm", 48)
+    opened.put("chamber.width_mm", 44)
+    opened.wait("data-checked=reach")
+    drawn = page.evaluate(
+        """async () => { const { view } = await import("/browser/scene.js");
+        const at = view.get("depth, lines").geometry.getAttribute("position");
+        return Math.abs(at.getY(1) - at.getY(0)); }"""
+    )
+    assert drawn == pytest.approx(44, abs=1e-3)
+    page.click("#undo")
     page.click("#of-holder summary")
     shown("holder.kind").select_option(label="rod on a face")
     expect(shown("holder.axis.2")).to_have_value("1", timeout=WAIT)

@@ -9,6 +9,7 @@ const END_ON = 0.97; // cosine between sight and a dimension from which on it is
 class View3D {
   #meshes = new Map();
   #waiting = false;
+  #press = null; // hears where the page is pressed
   #heard = [];
   #clicked = [];
   #kinds = { now: "", hear: null };
@@ -30,6 +31,7 @@ class View3D {
     sun.position.set(-0.4, 0.5, 1);
     this.camera.add(sun);
     this.scene.add(this.camera, new THREE.AmbientLight(0xffffff, 2.4));
+    this.#takeWheel(renderer.domElement);
     this.orbit = new THREE.OrbitControls(this.camera, renderer.domElement);
     this.orbit.addEventListener("change", () => { this.draw(); for (const hear of this.#heard) hear(); });
     this.triad = new THREE.Scene();
@@ -49,6 +51,16 @@ class View3D {
     });
     new ResizeObserver(() => this.#resize()).observe(element);
     this.#resize();
+  }
+
+  // The wheel zooms after a click in the view, or with Ctrl; else it scrolls the page.
+  #takeWheel(canvas) {
+    let isOurs = false;
+    this.#press = (event) => { isOurs = event.target === canvas; };
+    document.addEventListener("pointerdown", this.#press, { capture: true });
+    canvas.addEventListener("wheel", (event) => {
+      if (!isOurs && !event.ctrlKey) event.stopImmediatePropagation();
+    }, { capture: true, passive: true });
   }
 
   static lineOf(points, colour) {
@@ -383,6 +395,7 @@ class View3D {
   dispose() {
     for (const name of [...this.#meshes.keys()]) this.remove(name);
     this.orbit.dispose();
+    document.removeEventListener("pointerdown", this.#press, { capture: true });
     this.renderer.dispose();
     this.renderer.forceContextLoss();
     this.renderer.domElement.remove();
