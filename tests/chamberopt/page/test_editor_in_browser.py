@@ -251,6 +251,24 @@ def test_what_is_seen_from_a_side(opened: Page, side: str, opacity: float, texts
     assert opened.page.evaluate(LOOKED) == [opacity, texts]
 
 
+def test_texts_of_a_small_view_can_be_read(opened: Page) -> None:
+    heights = """async () => {
+      const { view } = await import("/browser/scene.js");
+      const [text] = view.get("width").children, found = [];
+      for (const height of ["", "150px"]) {
+        view.element.style.height = height;
+        await new Promise((done) => { setTimeout(done, 300); });
+        const far = 2 * Math.tan(view.camera.fov * Math.PI / 360);
+        found.push(text.scale.y * view.element.clientHeight / far);
+      }
+      view.element.style.height = "";
+      await new Promise((done) => { setTimeout(done, 300); });
+      return found;
+    }"""
+    usual, small = opened.page.evaluate(heights)
+    assert small == pytest.approx(min(usual, 15.0), abs=0.1)
+
+
 def test_the_face_under_the_pointer_lights_up(opened: Page) -> None:
     """A side of a cube is two triangles."""
     opened.tab("target")

@@ -2,6 +2,7 @@
 "use strict";
 THREE.ColorManagement.enabled = false; // a colour on the screen is the one of the colour bar
 const TEXT_HEIGHT = 0.0115; // over its distance: 2.2 % of the view's height
+const TEXT_PX = 15; // least height on the screen, so that a text is read in a small view too
 const OPACITY = { wall: 0.16, sonotrode: 0.9 }; // of the kinds that are seen through
 const FROM_BELOW = 0.08; // opacity of the sonotrode before the part
 const WIDE = 0.7; // width over height of a view that shows all, also what is as wide as its diagonal
@@ -371,9 +372,11 @@ class View3D {
       const { along } = mesh.userData, isEndOn = along && Math.abs(sight.dot(new THREE.Vector3(...along))) > END_ON;
       mesh.traverse((one) => { one.layers.set(isEndOn ? 1 : 0); }); // the camera sees the layer 0
     }
-    const height = TEXT_HEIGHT * this.element.clientHeight / (2 * Math.tan(this.camera.fov * Math.PI / 360));
+    const usual = TEXT_HEIGHT * this.element.clientHeight / (2 * Math.tan(this.camera.fov * Math.PI / 360));
+    const height = Math.max(usual, TEXT_PX), scale = TEXT_HEIGHT * height / usual;
     const texts = all.filter(({ userData, visible }) => userData.isText && visible).flatMap(({ children }) => children);
     for (const one of texts.sort((a, b) => b.renderOrder - a.renderOrder)) {
+      one.scale.set(scale * one.scale.x / one.scale.y, scale, 1);
       const width = height * one.scale.x / one.scale.y, [x, y] = this.onScreen(one.position);
       const left = x - one.center.x * width, top = y - (1 - one.center.y) * height;
       const isOver = taken.some(([l, t, w]) => left < l + w && l < left + width && top < t + height && t < top + height);
