@@ -66,6 +66,7 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             assert page.locator("#picture img").evaluate("one => one.naturalWidth") > 0
             opened.wait("data-chamber=proposal")  # it is seen in 3D too
             kinds = {"target", "sonotrode", "chamber wall"}
+            expect(page.locator("#legend")).to_contain_text("chamber wall")  # at the next frame
             assert set(page.locator("#legend li").all_text_contents()) >= kinds
             page.click("#rows-fold summary")
             shown = page.locator("#rows tr:has(th:text-is('Balls'))")
