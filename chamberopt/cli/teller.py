@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from chamberopt.cli.console import print_remarks, print_warnings
 from chamberopt.cli.prepare import compile_with_message
 from chamberopt.common.progress import step
+from chamberopt.workflows.optimise import CANDIDATES
 from chamberopt.workflows.simulate import StepTeller
 
 if TYPE_CHECKING:
@@ -43,6 +44,6 @@ class SearchTeller(TerminalTeller):
     @contextmanager
     def step(self, what: str, total: int | None = None) -> Iterator[Progress]:
         with step(what, total) as progress:
-            if what == "evaluations":
+            if what == CANDIDATES:
                 self._interrupt.wait_for_evaluation(self._how_to_resume)
             yield progress

@@ -42,6 +42,7 @@ LEAST_MM, MOST_MM = 0.03, 1.5
 INSIDE, OUTSIDE = "inside", "outside"
 NOT_DECIDED = "not decided"
 UNTIL = "an estimate until strips are measured: chamberopt calibrate"
+TOO_FEW = "too few dents were simulated to tell the peening strength; simulate longer"
 FORM = (
     "a range such as 0.15-0.20A, a value with its tolerance such as 0.20+-0.02A, or a value such "
     "as 0.15A (to 30 % or 0.076 mm above it, by SAE AMS 2430); in mm of an A, N or C strip"
@@ -224,7 +225,7 @@ class Comparison:
         found = PredictedIntensity.of(metrics, calibration)
         if found is not None:
             return cls.with_prediction(wanted, found)
-        why = "too few dents were simulated to tell the strength"
+        why = TOO_FEW
         if calibration is not None and calibration.not_mmA:
             why = f"the calibration has arc heights of a {calibration.strips}, not mmA"
         return cls(NOT_DECIDED, NOT_DECIDED, f"not known: {why}")

@@ -64,8 +64,8 @@ def alarms(result: Result) -> Iterator[str]:
     unresolved = [row.label.text for row in told if _is_unresolved(row.result)]
     if unresolved:
         yield (
-            f"Too few dents were simulated to resolve: {', '.join(unresolved)}. Simulate with more "
-            "process.accuracy.replicas or a longer simulated_time_s before this is built."
+            f"Too few dents were simulated to resolve: {', '.join(unresolved)}. Simulate "
+            "longer, or with more replicas, before this is built."
         )
     trapped = result.record.trapped
     if trapped and max(trapped.rattling_time, trapped.rattling_impacts) >= JAMMED:
@@ -79,8 +79,8 @@ def alarms(result: Result) -> Iterator[str]:
         yield (
             "The shot had not settled when recording began: the target was dented by "
             f"{percent(abs(excess))} {'more' if excess > 0.0 else 'less'} in the first half of the "
-            "simulated time than in the second. Simulate with a longer "
-            "process.accuracy.warmup_time_s before this is built."
+            "simulated time than in the second. Simulate with a "
+            "longer warm-up before this is built."
         )
     said = [*time_lines(result)[:1], *intensity_lines(result.design, result.metrics)]
     yield from (one.text for one in said if one.warns)
@@ -458,7 +458,7 @@ def _expected(result: Result) -> Iterator[Row]:
     wanted = result.design.process.intensity_mmA
     if wanted is None and (reason := why_no_intensity(calibration)):
         yield "", f"{reason[0].upper()}{reason[1:]}."
-    for one in answer_lines(result):
+    for one in answer_lines(result, load_start(result)):
         if one.about in ("best", "calibration", "ranges"):  # zones have their own block
             yield "", one.text
     yield "", f"± 95 % intervals. {limits_of_intervals(result)}"
@@ -495,7 +495,7 @@ def _tolerances(result: Result) -> Iterator[Row]:
         usual = f"{plain(low)} to {plain(high)} µm, {USUAL_IN_WORDS}"
         yield "", f"Amplitude: {usual}. The design has no [tolerances]: others are not known."
     elif found is None:
-        yield "", "What they cost was not simulated: chamberopt simulate --tolerances tells it."
+        yield "", "What they cost was not simulated."
     else:
         yield from sheet_rows(found)
 
@@ -503,7 +503,7 @@ def _tolerances(result: Result) -> Iterator[Row]:
 def _warnings(result: Result) -> Iterator[Row]:
     warnings = result.record.warnings
     if warnings is None:
-        yield "", "The design was not checked: chamberopt check lists its warnings."
+        yield "", "The design was not checked, so that its warnings are not known."
     elif not warnings:
         yield "", "There are none."
     yield from (("", text) for text in warnings or ())

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text
-from chamberopt.design.intensity import OUTSIDE, Comparison, PredictedIntensity
+from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
+from chamberopt.design.intensity import OUTSIDE, TOO_FEW, Comparison, PredictedIntensity
 from chamberopt.documents.document import AnswerLine
 from chamberopt.documents.ranges import groups_text, slow_end_is_late, time_at_slow_end
 from chamberopt.documents.wording import metric_label, plain
@@ -70,6 +72,14 @@ def time_standing(design: Design, time: Estimate) -> str:
     return NOT_MET if planned < times * time.low else NOT_DECIDED
 
 
+def enough_time(design: Design, metrics: Mapping[str, Estimate]) -> float | None:
+    """Return the least whole time [s] that is enough by `coverage_standing`; None if not known."""
+    time = metrics.get(TIME)
+    if time is None or time.in_words or not 0.0 < time.high < math.inf:
+        return None
+    return float(math.ceil(_times(design) * time.high))
+
+
 def _times(design: Design) -> float:
     """Return the wanted coverage as a multiple of the time to 98 %; 1 if none is asked for."""
     percent = design.process.coverage_percent
@@ -117,7 +127,8 @@ def _of_process(text: str, warns: bool) -> AnswerLine:
 def intensity_lines(design: Design, metrics: Mapping[str, Estimate]) -> Iterator[AnswerLine]:
     """Yield a sentence on the intensity, beside the wanted one if there is one.
 
-    It warns if it is outside. With none wanted, one that strips tell is among the figures.
+    It warns if it is outside, or if none is known because too little was simulated. With none
+    wanted, one that strips tell is among the figures.
     """
     if design.process.intensity_mmA is not None:
         found = Comparison.of(design.process.intensity_mmA, metrics, design.calibration)
@@ -128,6 +139,25 @@ def intensity_lines(design: Design, metrics: Mapping[str, Estimate]) -> Iterator
         one := PredictedIntensity.of(metrics, design.calibration)
     ):
         yield _of_process(f"Almen intensity: {one.in_words}.", False)
+    elif design.calibration is None and _is_unresolved(metrics):
+        yield _of_process(f"Almen intensity: not known: {TOO_FEW}.", True)
+
+
+def _is_unresolved(metrics: Mapping[str, Estimate]) -> bool:
+    strength = metrics.get("strength_um")
+    return strength is not None and strength.in_words == NOT_RESOLVED
+
+
+def times_longer(result: Result) -> int:
+    """Return how many times the simulated time tells the peening strength; 1 if it is told.
+
+    Where the dents are enough for all but the strength, twice the time is a start, as the time
+    that it needs is not known.
+    """
+    if not _is_unresolved(result.metrics):
+        return 1
+    needed = result.record.field.simulated_s_needed.p05_times_intensity or 0.0
+    return max(2, math.ceil(needed / result.record.simulated_time_s))
 
 
 def wanted_rows(result: Result) -> Iterator[tuple[str, str]]:

@@ -35,13 +35,21 @@ from chamberopt.documents.overview import comparison_overview
 from chamberopt.documents.proposal import matter_of
 from chamberopt.documents.report import answer_section
 from chamberopt.documents.study import aim_in_words
+from chamberopt.documents.wanted import times_longer
 from chamberopt.documents.wording import value_text
 from chamberopt.page.answers import packed, part_answer, shape_answer, step_texts, surface_answer
 from chamberopt.page.checker import Checker
 from chamberopt.page.duration import duration_in_words
 from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
-from chamberopt.page.page_words import CHOICES, amplitudes_named, balls_named, explained, on_page
+from chamberopt.page.page_words import (
+    CHOICES,
+    amplitudes_named,
+    balls_named,
+    explained,
+    names_met,
+    on_page,
+)
 from chamberopt.page.picking import Picker
 from chamberopt.page.started_commands import OneCommand
 from chamberopt.page.structure import (
@@ -140,16 +148,24 @@ def _stale(result: Result, now: Design) -> str:
 def shown(folders: Sequence[Path]) -> dict[str, object]:
     """Return the 3D view of results side by side, with the answer of one or the comparison of two.
 
+    Where one does not tell the peening strength, `longer` has how many times as long a simulation
+    tells it, and this time as values of the design.
+
     Raises:
         InputError: a folder has no usable result, or the results cannot be compared.
     """
+    longer: dict[str, object] = {}
     html, content = parts_content(folders)
     if len(folders) > 1:
         first = comparison_overview(compare(folders))
     else:
         result = load_result(folders[0])
         first = answer_section(result, load_start(result))
-    return {"content": content, "html": explained(section(first, viewer) + html)}
+        if (times := times_longer(result)) > 1:
+            now = result.design.process.accuracy.simulated_time_s
+            longer = {"times": times, "values": {SIMULATED_TIME: float(f"{times * now:.4g}")}}
+    html = explained(section(first, viewer) + html)
+    return {"content": content, "html": html, "longer": longer}
 
 
 def difference(folders: Sequence[Path]) -> dict[str, str]:
@@ -165,6 +181,7 @@ def difference(folders: Sequence[Path]) -> dict[str, str]:
         return {"picture": f"data:image/png;base64,{b64encode(read_file(picture)).decode()}"}
 
 
+SIMULATED_TIME = "process.accuracy.simulated_time_s"
 MOST_FILES = 20  # versions of the design's text that are kept for the pages that read them
 STUDY_NAME = re.compile(r"\w[\w .+-]{0,100}\.toml")
 COMMANDS = ("simulate", "run", "sweep", "report", "sheet")
@@ -295,9 +312,10 @@ class Acts:
 
     def study(self, asked: Any) -> dict[str, object]:
         """Write a study file beside the design, and remove it again if it is no valid study."""
-        name, evaluations = str(asked["name"]), float(asked["evaluations"])
+        name, evaluations = str(asked["name"]).strip(), float(asked["evaluations"])
+        name += "" if not name or name.endswith(".toml") else ".toml"
         if not STUDY_NAME.fullmatch(name):
-            raise InputError(f"{name!r}: give a name of letters and digits that ends in .toml")
+            raise InputError(f"{name!r}: give a name of letters and digits")
         if not evaluations.is_integer():
             raise InputError(f"evaluations: given {evaluations:g}; give a whole number")
         file, path = self._file(asked), check_new_file(self.inside(name))
@@ -348,7 +366,16 @@ class Acts:
         folder = self.inside(str(asked["folder"]))
         if asked.get("seen") == version(folder):
             return {"version": asked["seen"]}
-        return candidates_answer(folder)
+        return candidates_answer(folder) | {"same": self._asking_the_same(folder)}
+
+    def _asking_the_same(self, folder: Path) -> list[str]:
+        """Return the other folders of studies that ask the same, of which one goes on with one."""
+        inputs, found = read_inputs(folder), []
+        for other in _result_folders(self._path.parent):
+            with suppress(InputError):
+                if other != folder and is_study_folder(other):
+                    found += [other] if read_inputs(other).asks_as(inputs) else []
+        return sorted(one.relative_to(self._path.parent).as_posix() for one in found)
 
     def candidate(self, asked: Any) -> dict[str, object]:
         folder, design = self.inside(str(asked["folder"])), self._file(asked).design
@@ -461,6 +488,7 @@ def _told_of(file: EditedFile) -> dict[str, object]:
                 "mark": matter.mark.capitalize(),
                 "words": on_page(matter.text),
                 "takes": _taken(design, one),
+                "meets": names_met(matter.text),
             }
             for one, matter in zip(design.to_settle, map(matter_of, design.to_settle), strict=True)
         ],

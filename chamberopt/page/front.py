@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, get_args
@@ -15,7 +15,7 @@ from chamberopt.chamber.propose.shop import load_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import check_new_file, read_file, remove_file, write_bytes
 from chamberopt.common.shipped import shipped_files
-from chamberopt.common.toml_errors import did_you_mean
+from chamberopt.common.toml_errors import MAX_CHOICES, closest_name, did_you_mean
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.calibration import Calibration
 from chamberopt.design.design import Design, validate
@@ -189,7 +189,7 @@ class Front:
         arguments = ["new", f"./{part.relative_to(self._folder).as_posix()}"]
         for option, (given, allowed) in wanted.items():
             if given and given not in allowed:
-                raise InputError(f"--{option}: given {given!r}; {did_you_mean(given, allowed)}")
+                raise InputError(f"--{option}: given {given!r}; {_hint(given, allowed)}")
             arguments += [f"--{option}={given}"] if given else []
         wishes = {name: str(asked[name]).strip() for name in ("intensity", "coverage", "ball-mm")}
         _require_possible(wishes, str(asked["material"]), bool(asked["pilot"]))
@@ -244,6 +244,15 @@ def _on_page(answer: Any) -> dict[str, object] | None:
         ],
         "choices": answer["choices"],
     }
+
+
+def _hint(given: str, allowed: Sequence[str]) -> str:
+    """Return a hint for a wrong name of a list: a similar one, or the alloy of a metal's name."""
+    if len(allowed) <= MAX_CHOICES or closest_name(given, allowed):
+        return did_you_mean(given, allowed)
+    of_metal = [one.name for one in alloys() if given.strip().lower() in one.metal.lower()]
+    found = [name for name in of_metal if name in allowed]
+    return f"did you mean {found[0]!r}?" if found else "choose one that the field lists"
 
 
 def _require_possible(wishes: Mapping[str, str], alloy: str, pilot: bool) -> None:

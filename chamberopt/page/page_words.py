@@ -59,6 +59,13 @@ COMMANDS = {
     "chamberopt shop --example": "the example of a shop's file",
     "simulate it with --tolerances": "simulate it with tolerances, in a terminal",
 }
+# Parts of messages that only a terminal needs: the page leaves them out.
+_TERMINAL = re.compile(
+    "; press Ctrl-C again to stop now|; --no-ranges leaves them out"
+    "|(?<= mm from the sonotrode): chamberopt strip|(?<=more note): --verbose shows all"
+    "|(?<=more notes): --verbose shows all|(?m:^to resume: .*\\n?)"
+    "|; to resume it: .*|; --tolerances simulates them too"
+)
 # Terms that not every reader knows, and what they mean (docs/reference/glossary.md).
 TERMS = {
     "uniform coverage": "mean coverage of the target less its standard deviation: high where the "
@@ -95,7 +102,8 @@ _FILES = (".toml", ".json", ".html", ".pdf", ".png", *SUFFIXES)  # "part.stl" is
 def on_page(text: str, known: set[str] | None = None) -> Words:
     """Return a message of the program with its keys and options in the words of the page.
 
-    A command is named by what the page has in its place. A term has its meaning where it stands
+    A command is named by what the page has in its place; how to go on in a terminal is left out. A
+    term has its meaning where it stands
     first.
 
     Args:
@@ -105,7 +113,7 @@ def on_page(text: str, known: set[str] | None = None) -> Words:
     ['raise ', ('height of the chamber', 'chamber.height_mm')]
     """
     made: Words = []
-    at, text = 0, _PLACE.sub("", text)
+    at, text = 0, _TERMINAL.sub("", _PLACE.sub("", text))
     known = set() if known is None else known
     for match in sorted((*_KEY.finditer(text), *_TERM.finditer(text)), key=lambda one: one.start()):
         found = match[0]
@@ -175,6 +183,21 @@ def balls_named(text: str) -> list[float]:
 def amplitudes_named(text: str) -> list[float]:
     """Return the amplitudes [µm], zero-to-peak, that a matter says would serve."""
     return list(dict.fromkeys(map(float, _AMPLITUDE.findall(text))))
+
+
+# How `new` names what the shot meets beside the target (chamber/propose/proposed_mask.py).
+_MET = re.compile(r"the shot also meets (.+? \([^()]*\)); ")
+_MET_NAME = re.compile(r"(?:the rest of )?(.+?) \([^()]*\)(?:, |$)")
+
+
+def names_met(text: str) -> list[str]:
+    """Return the surfaces that a matter says are met beside the target; [] if others are not named.
+
+    >>> names_met("NOT MASKED: the shot also meets WEB (80 mm²), RIM (3 mm² of it); what")
+    ['WEB', 'RIM']
+    """
+    found = _MET.search(text)
+    return _MET_NAME.findall(found[1]) if found else []
 
 
 def choices(allowed: tuple[str, ...] | list[str]) -> list[tuple[str, str]]:

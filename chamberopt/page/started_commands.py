@@ -61,9 +61,10 @@ class StartedCommand:
         """Return what the page shows of the command: printed lines and progress of its steps.
 
         The value `exit` is the exit status of the command, or None while it runs. `result` is the
-        folder of the result that it will leave, if any. Its warnings, and its lines where it
-        failed, are in the words of the page too. `answer` is what a command that was asked for JSON
-        has answered, or None. `draft` is a proposal before its pilots, while the command runs.
+        folder of the result that it will leave, if any. `printed` are its lines in the words of the
+        page, as its warnings are; `fault` are those where it failed. `answer` is what a command
+        that was asked for JSON has answered, or None. `draft` is a proposal before its pilots,
+        while the command runs.
         """
         code = self._process.poll()
         if code is not None:
@@ -71,6 +72,7 @@ class StartedCommand:
                 one.join(5.0)
         lines = self._lines[-MOST_LINES:]
         warnings = [one.removeprefix(WARNING) for one in lines if one.startswith(WARNING)]
+        printed = [words for words in map(on_page, lines) if words]
         return {
             "command": f"chamberopt {' '.join(self.arguments)}",
             "result": self._result,
@@ -78,7 +80,8 @@ class StartedCommand:
             "steps": [] if code is not None else list(self._steps.values()),
             "lines": lines,
             "warnings": [on_page(text) for text in warnings],
-            "fault": [on_page(text) for text in lines] if code else [],
+            "printed": printed,
+            "fault": printed if code else [],
             "exit": code,
             "draft": self._draft if code is None else None,
             "answer": json.loads("".join(self._answer)) if self._answer and code == 0 else None,

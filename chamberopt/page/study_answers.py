@@ -16,6 +16,7 @@ from chamberopt.common.limits import MAX_RESULT_BYTES, require_size
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.design import Design
 from chamberopt.documents.study import evaluated, reason_without_model, tried_sentence
+from chamberopt.documents.wanted import enough_time
 from chamberopt.documents.wording import Label, metric_label, objective_label, per_cent
 from chamberopt.page.page_words import on_page
 from chamberopt.pictures.charts.colours import BLUE, COVERAGE_MAP, GREEN, GREY, ORANGE, hex_colours
@@ -34,6 +35,7 @@ COLOURS = {
     "simulated": BLUE, "missed": GREY, "refused": GREY, "confirmed": GREEN, "start": ORANGE,
     "model": BLUE, "failed": GREY, "scale": hex_colours(COVERAGE_MAP, 32),
 }  # fmt: skip
+TIME = "process.treatment_time_s"
 EXACT = "The objective follows from the numbers alone, so that there is no model of it."
 
 
@@ -60,6 +62,7 @@ def candidates_answer(folder: Path) -> dict[str, object]:
     shown = [evaluated(one, labels[0]) for one in trials]
     numbers, best = best_so_far(shown, smaller)
     objectives = [one.objective for one in shown if one.objective]
+    best_trial = _best(trials)
     first = {
         trial.point: trial.number + 1 for trial in reversed(trials) if trial.stage != "confirm"
     }
@@ -70,6 +73,8 @@ def candidates_answer(folder: Path) -> dict[str, object]:
             "name": str(of) if of == one.number else f"{of} again",
             "kind": _kind(trial),
             "is_start": trial.number == 0 and trial.stage == "search",
+            "is_best": trial is best_trial,
+            "standing": _standing(trial, best_trial, is_finished(folder)),
             "feasible": one.feasible,
             "objective": _interval(one.objective),
             "told": labels[0].number(trial.goals[0]) if trial.goals else "",
@@ -103,6 +108,24 @@ def candidates_answer(folder: Path) -> dict[str, object]:
     }
 
 
+def _best(trials: Sequence[Trial]) -> Trial | None:
+    """Return the best trial that meets the constraints, of those that confirm if there are any.
+
+    The last confirmation of a candidate counts.
+    """
+    simulated = [one for one in trials if one.goals]
+    again = {one.point: one for one in simulated if one.stage == "confirm"}
+    feasible = [one for one in [*again.values()] or simulated if one.feasible]
+    return max(feasible, key=lambda one: one.score, default=None)
+
+
+def _standing(trial: Trial, best: Trial | None, is_over: bool) -> str:
+    """Return what a candidate is to the study, beside what became of it; "" for nothing."""
+    if trial is best:
+        return "the best" if is_over else "the best so far"
+    return "the start" if trial.number == 0 and trial.stage == "search" else ""
+
+
 def _meanings(labels: Sequence[Label]) -> list[str]:
     """Return a sentence for each objective whose name has to be explained."""
     return [f"The objective is {one.text}: {one.meaning}." for one in labels if one.meaning]
@@ -114,7 +137,8 @@ def candidate_answer(folder: Path, number: int, design: Design) -> dict[str, obj
     Args:
         number: number of the candidate, from 1.
         design: the design whose chamber the page shows. `differs` names its values in which it is
-            another than the study's design with the numbers of the candidate.
+            another than the study's design with the numbers of the candidate. `time` is the
+            peening time that is enough for the candidate, if the design has another, as values.
 
     Raises InputError if there is no such candidate.
     """
@@ -138,8 +162,19 @@ def candidate_answer(folder: Path, number: int, design: Design) -> dict[str, obj
         "values": values,
         "numbers": [(title_with_unit(name), str(one)) for name, one in values.items()],
         "figures": list(dict(figures).items()),
+        "time": _time(trial, design, values),
         "differs": [title_with_unit(name) for name in inputs.differences(design)],
     }
+
+
+def _time(trial: Trial, design: Design, values: dict[str, float | str]) -> dict[str, float]:
+    """Return the peening time that is enough for a candidate, by its key, or nothing.
+
+    There is nothing if it is not known, or if the design with the candidate's numbers has it.
+    """
+    enough = enough_time(design, trial.metrics)
+    now = values.get(TIME, design.process.treatment_time)
+    return {} if enough is None or enough == now else {TIME: enough}
 
 
 def model_answer(folder: Path) -> dict[str, Any]:

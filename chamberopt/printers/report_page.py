@@ -34,8 +34,8 @@ WHY_TIME = (
     "quantity."
 )
 HELP = (
-    "Drag to turn, use the wheel to zoom, point at the target to see its numbers there; a click "
-    "keeps them in a list."
+    "Drag to turn, use the wheel to zoom after a click or with Ctrl, point at the target to see "
+    "its numbers there; a click keeps them in a list."
 )
 
 

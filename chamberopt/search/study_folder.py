@@ -125,6 +125,7 @@ def _exact(point: Sequence[float]) -> str:
 
 FORMAT = 1
 MAX_DIFFERENCES = 12  # in one message
+OF_FURTHER = "begin_with", "optimizer.evaluations", "optimizer.seed"  # in which one differs
 RANGES = "study.design.ranges"  # no trial depends on them
 
 
@@ -176,6 +177,14 @@ class StudyInputs:
         """Return whether these are the inputs of a study, so that the study can be resumed."""
         now = study_inputs(study)["study"]
         return not _changed_names({"study": self.study}, {"study": now})
+
+    def asks_as(self, other: StudyInputs) -> bool:
+        """Return whether another study asks the same, whatever its budget, seed and first ones."""
+        mine, others = (
+            {k: v for k, v in _flatten(one.study).items() if k not in OF_FURTHER}
+            for one in (self, other)
+        )
+        return mine == others and self.plan == other.plan
 
     def differences(self, design: Design) -> list[str]:
         """Return the names of values in which a design differs from that of this study.

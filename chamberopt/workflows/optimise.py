@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from chamberopt.simulation.advice import Advice
 
 
+CANDIDATES = "candidates and confirmations"  # the step that ends with the last of them
 Found = TypeVar("Found", StudyResult, SweepResult)
 
 
@@ -70,7 +71,7 @@ def optimise_study(
         chamber = build_chamber(folder.study.design)
     at_once = _candidates_at_once(folder.study, chamber, teller)
     study, advice = _prepare(folder, chamber, executor, teller)
-    whole = teller.step("evaluations", most_evaluations(study))
+    whole = teller.step(CANDIDATES, most_evaluations(study))
     with whole as evaluations, teller.step("replicas of the candidates at work") as replicas:
         progress = StudyProgress(evaluations, replicas)
         result = run_study(study, folder, executor, progress, stop=stop, at_once=at_once)

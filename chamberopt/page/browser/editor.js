@@ -1,6 +1,6 @@
 // The page: its tabs, what is asked of the server as the design changes, and what is said of it.
 import { makeFields, sayAtFields, showValues } from "./fields.js";
-import { fillSurfaces, fillTarget, showChosen } from "./target.js";
+import { fillSurfaces, fillTarget, names, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import "./study/study.js";
@@ -129,7 +129,9 @@ function fillSettle() {
       take.addEventListener("click", () => change(changes));
       return take;
     });
-    return element("li", {}, element("span", {}, element("b", { textContent: one.mark }), ...onPage(one.words)), ...takes, done);
+    const isMeant = one.meets.length > 0 && one.meets.every((name) => names("part.target").includes(name));
+    const words = isMeant ? [`: ${one.meets.join(", ")} ${one.meets.length > 1 ? "are" : "is"} in the target now, so that this is settled.`] : onPage(one.words);
+    return element("li", {}, element("span", {}, element("b", { textContent: one.mark }), ...words), ...takes, done);
   });
   const list = element("ol", {}, ...rows);
   find("settle").replaceChildren(...rows.length ? [element("h2", { textContent: "To be settled before it is built" }), list] : []);

@@ -63,11 +63,14 @@ function numberRow(field) {
     const span = slider.max - slider.min;
     slider.step = field.whole ? 1 : 10 ** Math.floor(Math.log10(span / 100)) || "any";
   };
-  const bound = (wanted) => {
-    if (wanted[0] < wanted[1]) ends.set(field.name, wanted);
+  const bound = (wanted) => { // gives why other ends than these are taken, or ""
+    const [least, most] = wanted, now = value(field.name);
+    if (least < most) ends.set(field.name, wanted);
     scale();
     if (varied.has(field.name)) document.dispatchEvent(new Event("varied"));
-    show(value(field.name));
+    show(now);
+    if (!(least < most)) return `${least} is not less than ${most}: change the other end first.`;
+    return now !== null && (now < least || now > most) ? `The design has ${now}, which is to lie between the ends.` : "";
   };
   const show = (now) => {
     const [least, most] = ends.get(field.name);
@@ -86,7 +89,10 @@ function numberRow(field) {
     if (Number.isNaN(now)) sayAtFields({ [field.name]: `given ${box.value}, which is no number` });
     else change({ [field.name]: now });
   });
-  for (const end of [low, high]) end.addEventListener("change", () => bound([Number(low.value), Number(high.value)]));
+  for (const end of [low, high]) end.addEventListener("change", () => {
+    const why = bound([Number(low.value), Number(high.value)]);
+    sayAtFields(why ? { [field.name]: why } : {});
+  });
   const more = element("div", { className: "ends" }, low, "…", high), vary = [];
   if (field.varies && !field.fixed) {
     const tick = element("input", { type: "checkbox", checked: varied.has(field.name) });

@@ -1,5 +1,5 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
-import { ask, attempt, element, onPage, unpack, warning, wordsOf } from "./state.js";
+import { asLines, ask, attempt, element, onPage, unpack, warning, wordsOf } from "./state.js";
 import { followed, sinceBegin, stage } from "./steps.js";
 import { colourByState, lights, wayToTarget } from "./surfaces.js";
 
@@ -49,6 +49,7 @@ async function draw(part) {
   find("place").hidden = !part;
   const drawn = part && `${part} in ${known.unit}`; // its numbers have another size in another unit
   if (drawn === drawnPart && !view.get("walls")) return;
+  view.highlight("part", null);
   for (const name of ["part", ...CHAMBER]) view.remove(name);
   drawnPart = drawn;
   if (!part) return;
@@ -143,17 +144,17 @@ find("part").addEventListener("change", () => attempt(() => look(find("part").va
 
 // Show the command that proposes a chamber: how far it is, and in the end what it proposes.
 let drawn = 0, told = ""; // when the picture that is shown was drawn; the proposal that is shown
-function tell({ steps, seconds, lines, warnings, fault, exit, picture, result, proposal }) {
+function tell({ steps, seconds, printed, warnings, fault, exit, picture, result, proposal }) {
   find("made").hidden = false;
   find("stop").hidden = exit !== null;
   find("busy").textContent = exit !== null ? "" : sinceBegin(seconds);
   const isStopped = exit === 130, atEnd = isStopped ? ["Stopped."] : [];
   if (exit !== null || steps.length) find("progress").replaceChildren(...(exit === null ? stage(steps) : atEnd));
   find("warnings").replaceChildren(...warnings.map(warning));
-  find("printed").textContent = lines.join("\n");
-  find("printed-fold").hidden = exit === null || !lines.length;
+  find("printed").replaceChildren(...asLines(printed));
+  find("printed-fold").hidden = exit === null || !printed.length;
   find("error").hidden = !exit || isStopped;
-  find("error").replaceChildren(...fault.flatMap((words) => [...onPage(words), "\n"]));
+  find("error").replaceChildren(...asLines(fault));
   find("picture-fold").hidden = !picture;
   if (picture && picture[1] !== drawn) {
     find("picture").href = `/files/${picture[0].split("/").map(encodeURIComponent).join("/")}?${drawn = picture[1]}`;
@@ -215,6 +216,11 @@ function besideField(text, words) {
   field.focus();
   return true;
 }
+
+// What is wrong of a field is no longer said once the field has changed.
+for (const id of WISHES) for (const name of ["input", "change"]) find(id).addEventListener(name, () => {
+  if (find(id).hasAttribute("aria-invalid")) besideField("");
+});
 
 const ticked = () => [...find("names").querySelectorAll("input")];
 async function started(target) {

@@ -1,5 +1,5 @@
 // Results below the design's folder: in 3D, one or two side by side, with report and process sheet.
-import { ask, attempt, element, listen, onPage, say, state } from "./state.js";
+import { ask, attempt, change, element, listen, onPage, say, state } from "./state.js";
 import { start } from "./run.js";
 import { followStudy } from "./study/study.js";
 
@@ -46,15 +46,29 @@ find("show-results").addEventListener("click", () => attempt(() => show()));
 async function show() {
   const folders = ticked().reverse(); // the older first
   if (!folders.length || folders.length > 2) throw new Error("tick one result, or two to compare");
-  const { html, content } = await ask("/shown", { folders });
+  const { html, content, longer } = await ask("/shown", { folders });
   closeResults();
   seen = folders;
   find("shown").innerHTML = html; // the server's own, as in a report; names in it are escaped
   find("shown").prepend(element("div", { id: "stale" }));
   find("shown").hidden = find("close-results").hidden = false;
+  if (longer.times) find("stale").after(element("p", {}, simulateLonger(longer)));
   views = showParts(content);
   await refresh();
   if (folders.length > 1) await showDifference(folders);
+}
+
+// A button that makes the simulated time of the design longer, and leads to where it is simulated.
+function simulateLonger({ times, values }) {
+  const [seconds] = Object.values(values);
+  const longer = button("Simulate longer", () => {
+    change(values);
+    document.querySelector("[data-tab=run]").click();
+    say(`Each replica is ${seconds} s long now, ${times} times the time of this result: simulate the design again.`, true);
+  });
+  longer.id = "longer";
+  longer.title = `${times} times the simulated time: ${seconds} s in each replica`;
+  return longer;
 }
 
 // Where the second result covers more or less than the first, as the command compare draws it.

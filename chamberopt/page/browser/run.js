@@ -1,5 +1,5 @@
 // Running the commands on what is saved, and writing a study from the sliders.
-import { ask, attempt, element, isUnsaved, onPage, read, say, state, wordsOf } from "./state.js";
+import { asLines, ask, attempt, element, isUnsaved, listen, onPage, read, say, state, wordsOf } from "./state.js";
 import { bound, ends, makeFields, varied, varyOnly } from "./fields.js";
 import { bars, followed, sinceBegin } from "./steps.js";
 
@@ -28,6 +28,7 @@ const chosen = () => state.file.files.find((one) => one.name === find("of").valu
 // A design is simulated; a study is searched or mapped.
 function allow() {
   const { kind, words } = chosen() ?? {};
+  find("lasts").hidden = isRunning; // the bars tell what is left
   find("of-words").textContent = kind === "study" ? words : "";
   for (const button of document.querySelectorAll("[data-command], #search-sliders")) button.disabled = isRunning || (Boolean(refused) && "command" in button.dataset);
   for (const one of document.querySelectorAll(".of-design, .of-study")) one.hidden = one.className !== `of-${kind}`;
@@ -60,14 +61,19 @@ async function tellDuration() {
 }
 document.querySelector("[data-tab=run]").addEventListener("click", tellDuration);
 
+let putBack = []; // a number whose ends were put back, and why
 function showVaried() {
   const items = [...varied].map((name) => {
     const { in_full } = state.fields.find((one) => one.name === name);
     const [low, high] = ends.get(name).map((value, k) => element("input", { type: "number", step: "any", value, ariaLabel: `${in_full}, ${["least", "largest"][k]}` }));
-    for (const end of [low, high]) end.addEventListener("change", () => bound(name, [Number(low.value), Number(high.value)]));
+    for (const end of [low, high]) end.addEventListener("change", () => {
+      const why = bound(name, [Number(low.value), Number(high.value)]);
+      putBack = why ? [name, why] : [];
+      showVaried();
+    });
     const out = element("button", { type: "button", textContent: "✕", title: "leave it as it is", ariaLabel: `Leave ${in_full} as it is` });
     out.addEventListener("click", () => { varied.delete(name); makeFields(); });
-    return element("li", { title: name }, element("span", { textContent: in_full }), low, "…", high, out);
+    return element("li", { title: name }, element("span", { textContent: in_full }), low, "…", high, out, ...(putBack[0] === name ? [element("p", { className: "wrong", role: "alert", textContent: putBack[1] })] : []));
   });
   find("varied").replaceChildren(...(items.length ? items : [element("li", { textContent: "nothing yet" })]));
 }
@@ -94,7 +100,7 @@ let study = "";
 // Show a command that runs, by default what the server has started last, and give its exit status.
 export const follow = async (started) => (await followed(show, started))?.exit ?? null;
 
-function show({ command, result, steps, seconds, lines, exit }) {
+function show({ command, result, steps, seconds, printed, exit }) {
   if (exit !== null && command.startsWith("chamberopt new ")) return; // of the front page
   const before = study;
   study = exit === null && isStudy(command) ? result : "";
@@ -104,8 +110,8 @@ function show({ command, result, steps, seconds, lines, exit }) {
   allow();
   const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
   find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...toResult(command, result, exit));
-  find("printed").textContent = lines.join("\n");
-  find("printed-fold").hidden = !lines.length;
+  find("printed").replaceChildren(...asLines(printed));
+  find("printed-fold").hidden = !printed.length;
   if (exit) find("printed-fold").open = true;
 }
 
@@ -122,16 +128,24 @@ function toResult(command, result, exit) {
 }
 const isStudy = (command) => command.startsWith("chamberopt run ");
 
+// Commands use the saved file: their buttons say when they save it first.
+async function save() { if (isUnsaved()) await read("/save", { changes: state.changes }); }
+const starting = [...document.querySelectorAll("[data-command], #search-sliders")].map((button) => [button, button.textContent]);
+listen(() => {
+  for (const [button, words] of starting) button.textContent = isUnsaved() ? `Save and ${words[0].toLowerCase()}${words.slice(1)}` : words;
+});
+
 for (const button of document.querySelectorAll("[data-command]")) button.addEventListener("click", () => attempt(async () => {
-  if (isUnsaved()) throw new Error("there are unsaved changes: commands use the saved file, so save or undo them first");
+  await save();
   await followToEnd(await ask("/start", { command: button.dataset.command, of: find("of").value, points: find("points").value }));
 }, find("run-fault")));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
 // Write the study of the sliders, and run it.
 find("search-sliders").addEventListener("click", () => attempt(async () => {
-  if (isUnsaved()) throw new Error("there are unsaved changes: the study begins from the saved design, so save or undo them first");
   const vary = Object.fromEntries([...varied].map((name) => [name, ends.get(name)]));
-  const { study } = await ask("/study", { vary, aim: find("aim").value, name: find("study-name").value, evaluations: Number(find("evaluations").value) });
+  const question = { vary, aim: find("aim").value, name: find("study-name").value, evaluations: Number(find("evaluations").value) };
+  await save();
+  const { study } = await ask("/study", question);
   await read();
   find("of").value = study;
   allow();

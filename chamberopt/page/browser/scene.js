@@ -101,6 +101,9 @@ function dimensions() {
   show("box", null, ends, [[b.map((x, i) => short(x - a[i])).join(" × ") + " mm", [0.5 * (a[0] + b[0]), a[1], b[2] + 0.03 * size]]]);
   show("width", [1, 0, 0], dimension([low[0], low[1], 0], [high[0], low[1], 0], [0, -gap, 0], size),
     [[`${short(high[0] - low[0])} mm`, [0.5 * (low[0] + high[0]), low[1] - gap, -0.4 * gap]]]);
+  const across = high[1] - low[1], isRound = value("chamber.shape") !== "box" && Math.abs(high[0] - low[0] - across) < 1e-3 * size;
+  show("depth", [0, 1, 0], isRound ? [] : dimension([low[0], low[1], 0], [low[0], high[1], 0], [-gap, 0, 0], size),
+    isRound ? [] : [[`${short(across)} mm`, [low[0] - gap, 0.5 * (low[1] + high[1]), -0.4 * gap]]]);
   show("height", upright, [...dimension([high[0], high[1], 0], [high[0], high[1], high[2]], [gap, 0, 0], size),
     ...dimension([b[0], a[1], 0], [b[0], a[1], a[2]], [0, 0, 0], size)],
   [[`${short(high[2])} mm`, [high[0] + gap, high[1], 0.8 * high[2]]], [`${short(a[2])} mm`, [b[0], a[1], 0.5 * a[2]]]]);

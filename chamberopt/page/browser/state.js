@@ -136,6 +136,7 @@ let fading = 0;
 // Text, or a message of the server: texts, and pairs of words with what they are in a file as a tip; or elements.
 export const onPage = (words) => [words].flat().map((one) => typeof one === "string" || one instanceof Node ? one
   : element("abbr", { textContent: one[0], title: one[1] }));
+export const asLines = (messages) => messages.flatMap((words) => [...onPage(words), "\n"]);
 // A warning as one line, which opens on a click.
 export const warning = (words) => element("details", { className: "warned" }, element("summary", {}, ...onPage(words)));
 export const wordsOf = (error) => error.words ?? error.message;
@@ -153,7 +154,7 @@ export function say(text, good = false) {
 
 // Run an act; what goes wrong is said in an element beside its button, or over the page.
 export async function attempt(act, place = null) {
-  const tell = (words) => { if (place) place.replaceChildren(...onPage(words)); else say(words); };
+  const tell = (words) => { if (!place) { say(words); return; } place.replaceChildren(...onPage(words)); if (words) place.scrollIntoView({ block: "nearest" }); };
   try { say(""); tell(""); return await act(); } catch (error) { tell(wordsOf(error)); return undefined; }
 }
 

@@ -40,12 +40,14 @@ export function showChosen() {
     const now = state.changes[`${table}.${key}`];
     if (now === null) delete kept[key]; else if (now !== undefined) kept[key] = now;
   }
+  const named = names();
+  for (const button of find("names").querySelectorAll("button")) button.ariaPressed = String(named.includes(button.textContent));
   find("chosen").textContent = [`[${table}]`, ...Object.entries(kept).map(([key, now]) => `${key} = ${JSON.stringify(now)}`)].join("\n");
 }
 
-// The names that the target is chosen by, as far as it is chosen by names.
-function names() {
-  const table = find("surface").value, now = state.changes[`${table}.surface`];
+// The names that the target, or another table, is chosen by, as far as it is chosen by names.
+export function names(table = find("surface").value) {
+  const now = state.changes[`${table}.surface`];
   const kept = now === undefined ? state.file.chosen[table]?.surface : now;
   return [kept ?? []].flat().filter((name) => name !== "all");
 }

@@ -9,9 +9,11 @@ import pytest
 from chamberopt.common.estimate import Estimate
 from chamberopt.documents.wanted import (
     coverage_standing,
+    enough_time,
     intensity_lines,
     time_lines,
     time_text,
+    times_longer,
     wanted_rows,
 )
 
@@ -114,3 +116,43 @@ def test_an_intensity_that_is_certainly_outside_is_a_warning() -> None:
     (line,) = intensity_lines(a_design(250.0, wanted=(0.15, 0.2)), far)
     assert line.warns
     assert "0.15 to 0.2 mmA: outside with the whole interval; predicted 0.015 mmA" in line.text
+
+
+@pytest.mark.parametrize(("percent", "enough"), [(None, 107.0), (200.0, 213.0)])
+def test_the_least_whole_time_that_is_enough(percent: float | None, enough: float) -> None:
+    time = {"time_to_98_s": Estimate(100.0, 6.2)}
+    assert enough_time(a_design(1.0, percent), time) == enough
+    assert coverage_standing(a_design(enough, percent), time) == "met"
+    assert coverage_standing(a_design(enough - 1.0, percent), time) != "met"
+
+
+@pytest.mark.parametrize(
+    "time", [None, Estimate(9.0, math.inf), Estimate(9.0, 1.0, in_words="never")]
+)
+def test_no_time_is_enough_where_none_is_known(time: Estimate | None) -> None:
+    assert enough_time(a_design(1.0), {"time_to_98_s": time} if time else {}) is None
+
+
+UNKNOWN = {"strength_um": Estimate(13.0, 9.0).not_known("not resolved")}
+
+
+def test_an_intensity_that_is_not_known_has_its_remedy() -> None:
+    (line,) = intensity_lines(a_design(250.0), UNKNOWN)
+    assert line.text == (
+        "Almen intensity: not known: too few dents were simulated to tell the peening strength; "
+        "simulate longer."
+    )
+    assert line.warns
+    (wanted,) = intensity_lines(a_design(250.0, wanted=(0.15, 0.2)), UNKNOWN)
+    assert wanted.text.endswith("to tell the peening strength; simulate longer.")
+
+
+@pytest.mark.parametrize(("needed", "times"), [(35.0, 4), (5.0, 2), (None, 2)])
+def test_the_time_that_tells_the_strength(needed: float | None, times: int) -> None:
+    """Of a simulation of 10 s, after which the places of the part are told or not."""
+    field = SimpleNamespace(simulated_s_needed=SimpleNamespace(p05_times_intensity=needed))
+    record = SimpleNamespace(field=field, simulated_time_s=10.0)
+    result: Any = SimpleNamespace(metrics=UNKNOWN, record=record)
+    assert times_longer(result) == times
+    result.metrics = {"strength_um": Estimate(13.0, 0.2)}
+    assert times_longer(result) == 1

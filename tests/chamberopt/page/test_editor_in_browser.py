@@ -194,6 +194,29 @@ def test_the_legend_hides_a_kind_and_the_view_turns_to_an_axis(opened: Page) -> 
         page.click("#undo")
 
 
+def test_the_wheel_zooms_only_after_a_click_or_with_ctrl(opened: Page) -> None:
+    page = opened.page
+    box = page.locator("#view canvas").bounding_box()
+    far = """async () => { const { view } = await import("/browser/scene.js");
+        return view.camera.position.distanceTo(view.orbit.target); }"""
+    place, before = (box["x"] + 30, box["y"] + 400), page.evaluate(far)
+    page.click("h1, header", position={"x": 2, "y": 2})
+    for click, key in ((False, ""), (False, "Control"), (True, "")):
+        if click:
+            page.mouse.click(*place)
+        page.mouse.move(*place)
+        if key:
+            page.keyboard.down(key)
+        page.mouse.wheel(0, -200)
+        page.wait_for_timeout(200)
+        if key:
+            page.keyboard.up(key)
+        now = page.evaluate(far)
+        assert (now < 0.99 * before) == (click or bool(key))
+        before = now
+    page.locator("#view").dblclick(position={"x": 30, "y": 400})
+
+
 def test_a_switch_hides_the_chamber_as_its_legend_does(opened: Page) -> None:
     page, chamber = opened.page, opened.page.get_by_label("show the chamber")
     wall, sonotrode = (
@@ -226,6 +249,24 @@ def test_what_is_seen_from_a_side(opened: Page, side: str, opacity: float, texts
     """From below the part through the sonotrode; no dimension along the line of sight."""
     opened.page.get_by_role("button", name=side, exact=True).click()
     assert opened.page.evaluate(LOOKED) == [opacity, texts]
+
+
+def test_texts_of_a_small_view_can_be_read(opened: Page) -> None:
+    heights = """async () => {
+      const { view } = await import("/browser/scene.js");
+      const [text] = view.get("width").children, found = [];
+      for (const height of ["", "150px"]) {
+        view.element.style.height = height;
+        await new Promise((done) => { setTimeout(done, 300); });
+        const far = 2 * Math.tan(view.camera.fov * Math.PI / 360);
+        found.push(text.scale.y * view.element.clientHeight / far);
+      }
+      view.element.style.height = "";
+      await new Promise((done) => { setTimeout(done, 300); });
+      return found;
+    }"""
+    usual, small = opened.page.evaluate(heights)
+    assert small == pytest.approx(min(usual, 15.0), abs=0.1)
 
 
 def test_the_face_under_the_pointer_lights_up(opened: Page) -> None:
@@ -274,6 +315,35 @@ def test_the_face_of_a_cad_file_lights_up_and_is_taken(opened: Page, tmp_path: P
         served.process.communicate()
 
 
+def test_names_of_the_target_are_marked(opened: Page, tmp_path: Path) -> None:
+    """A cube of two names, of which one is the target, and the other is met beside it."""
+    served = Served(tmp_path, "design.toml")
+    corners = [(x, y, z) for z in (-8, 8) for y in (-8, 8) for x in (-8, 8)]
+    sides = "1 3 4 2", "5 6 8 7", "1 2 6 5", "2 4 8 6", "4 3 7 8", "3 1 5 7"
+    lines = [f"v {x} {y} {z}" for x, y, z in corners]
+    lines += ["g WEB", f"f {sides[0]}", "g RIM", *(f"f {one}" for one in sides[1:])]
+    (tmp_path / "named.obj").write_text("\n".join(lines))
+    dropped, text = ("direction", "angle_deg", "box_mm"), (tmp_path / "design.toml").read_text()
+    kept = "\n".join(x for x in text.splitlines() if x.partition(" =")[0] not in dropped)
+    kept = kept.replace("box.stl", "named.obj").replace('surface = "all"', 'surface = "WEB"')
+    met = "NOT MASKED: the shot also meets RIM (80 mm²); what has to keep its size takes a mask"
+    (tmp_path / "design.toml").write_text(f'to_settle = ["{met}"]\n{kept}')
+    try:
+        page = Page(opened.page.context.browser, served)
+        page.tab("target")
+        web, rim = (page.page.locator("#names button", has_text=one) for one in ("WEB", "RIM"))
+        expect(web).to_have_attribute("aria-pressed", "true", timeout=WAIT)
+        expect(rim).to_have_attribute("aria-pressed", "false")
+        expect(page.page.locator("#settle li")).to_contain_text("the shot also meets RIM")
+        rim.click()
+        expect(rim).to_have_attribute("aria-pressed", "true")
+        expect(page.page.locator("#settle li")).to_contain_text("RIM is in the target now")
+        assert not page.errors
+    finally:
+        served.process.kill()
+        served.process.communicate()
+
+
 def test_a_slider_moves_and_is_undone_as_one(opened: Page) -> None:
     slider = opened.page.locator(".field", has=opened.page.locator('[id="shot.mass_g"]'))
     slider = slider.locator("input[type=range]")
@@ -310,6 +380,15 @@ def test_shape_and_holder_are_chosen_in_words(opened: Page) -> None:
     expect(shown("chamber.length_mm")).not_to_have_value("", timeout=WAIT)
     expect(shown("chamber.diameter_mm")).to_have_count(0)
     opened.put("chamber.length_mm", 48)
+    opened.put("chamber.width_mm", 44)
+    opened.wait("data-checked=reach")
+    drawn = page.evaluate(
+        """async () => { const { view } = await import("/browser/scene.js");
+        const at = view.get("depth, lines").geometry.getAttribute("position");
+        return Math.abs(at.getY(1) - at.getY(0)); }"""
+    )
+    assert drawn == pytest.approx(44, abs=1e-3)
+    page.click("#undo")
     page.click("#of-holder summary")
     shown("holder.kind").select_option(label="rod on a face")
     expect(shown("holder.axis.2")).to_have_value("1", timeout=WAIT)
@@ -424,11 +503,27 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     most.fill("2.5")
     most.press("Tab")
     expect(most).to_have_value("3")  # that of the design is within
+    expect(page.locator("#varied .wrong")).to_have_text(
+        "The design has 3, which is to lie between the ends."
+    )
+    least = page.locator("[aria-label='Shot mass [g], least']")
+    before = least.input_value()
+    least.fill("70")
+    least.press("Tab")
+    expect(least).to_have_value(before)
+    expect(page.locator("#varied .wrong")).to_have_text(
+        "70 is not less than 3: change the other end first."
+    )
     page.select_option("#aim", "p05_coverage")
     page.fill("#evaluations", "2")
-    page.fill("#study-name", "stopped.toml")
+    page.fill("#study-name", "design.toml")
+    page.click("#search-sliders")
+    expect(page.locator("#search-fault")).to_contain_text("design.toml")
+    expect(page.locator("#search-fault")).to_be_in_viewport()
+    page.fill("#study-name", "stopped")
     page.click("#search-sliders")
     expect(page.locator("#message")).to_contain_text("written: stopped.toml")
+    expect(page.locator("#lasts")).to_be_hidden()  # while it runs
     page.click("#stop")
     expect(page.locator("#progress")).to_contain_text("stopped", timeout=WAIT)
     page.click("#close-study")
@@ -442,8 +537,15 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     opened.tab("run")
     page.select_option("#of", "design.toml")
     expect(page.locator("#lasts")).to_be_empty()  # nothing like it was simulated yet
-    page.click("[data-command=simulate]")
+    simulate = page.locator("[data-command=simulate]")
+    page.locator('[id="process.treatment_time_s"]').evaluate("one => { one.value = 6; }")
+    page.locator('[id="process.treatment_time_s"]').dispatch_event("change")
+    expect(simulate).to_have_text("Save and simulate")
+    expect(page.locator("#search-sliders")).to_have_text("Save and search for the best")
+    simulate.click()
     expect(page.locator("#progress")).to_contain_text("finished", timeout=WAIT)
+    expect(simulate).to_have_text("Simulate")
+    assert load_design(folder / "design.toml").process.treatment_time_s == 6
     expect(page.locator("#lasts")).to_contain_text("about 5 s")
     result = json.loads((folder / "results" / "design" / "result.json").read_text())
     out = folder / "by-command"
@@ -457,6 +559,15 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     page.click("#show-results")
     opened.wait("data-drawn=yes")
     assert page.locator("#shown #part-0 canvas").count() == 1
+    shown = page.locator("#shown")
+    expect(shown).to_contain_text("Almen intensity: not known: too few dents were simulated")
+    longer = page.locator('[id="process.accuracy.simulated_time_s"]')
+    before, times = longer.input_value(), page.locator("#longer").get_attribute("title")
+    page.click("#longer")
+    assert float(longer.input_value()) == int(times.split()[0]) * float(before)
+    expect(page.locator("#run")).to_be_visible()
+    page.click("#undo")
+    opened.tab("results")
     page.click("#close-results")
     opened.tab("run")
     page.locator("#progress").get_by_text("Show the result").click()

@@ -93,11 +93,13 @@ def test_a_wrong_file_or_wish_is_answered_in_words(front: Served, tmp_path: Path
     for name, said in (("box.stl", "already"), *((name, "not a part") for name in names)):
         assert said in upload(front, name, box + b"another")["error"]
     assert "broken.stl" in upload(front, "broken.stl", b"solid of nothing")["error"]
-    wrong = {"unit": "ft", "material": "--help", "shape": "own.py", "shot": "gravel", "pose": "up"}
+    wrong = {"unit": "ft", "shape": "own.py", "shot": "gravel", "pose": "up"}
     for option, given in wrong.items():
         error = front.ask("/propose", PROPOSED | {option: given})["error"]
         assert f"--{option}: given {given!r}; allowed" in error
     for wish, said in (
+        ({"material": "--help"}, "--material: given '--help'; choose one that the field lists"),
+        ({"material": "titanium"}, "--material: given 'titanium'; did you mean 'Ti"),
         ({"coverage": "5"}, "--coverage: given 5; allowed: from 100 to 1000 %"),
         ({"ball-mm": "large"}, "--ball-mm: given 'large'; give a number"),
         ({"intensity": "15A"}, "--intensity: given '15A'"),

@@ -7,6 +7,22 @@ from tests.chamberopt.page.conftest import Served
 from tests.helpers.results.browser import chromium, expect, needs_chromium
 
 pytestmark = needs_chromium
+# Where the corner at x = 1 of a marked surface is drawn after the surface was turned and moved.
+MARKED_BEFORE_POSED = """() => {
+    const place = document.createElement("div");
+    place.style.cssText = "width: 100px; height: 100px";
+    document.body.append(place);
+    const view = new View3D(place), points = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0]);
+    view.surface("part", { points, triangles: new Uint32Array([0, 1, 2]), kind: "rest" });
+    view.highlight("part", [0], "#00ff00");
+    view.pose("part", [0, 1, 0, -1, 0, 0, 0, 0, 1], [0, 0, 5]);
+    const drawn = view.get("highlight");
+    drawn.updateWorldMatrix(true, false);
+    const at = new THREE.Vector3(1, 0, 0).applyMatrix4(drawn.matrixWorld).toArray();
+    view.dispose();
+    place.remove();
+    return at;
+}"""
 
 
 def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path) -> None:
@@ -41,6 +57,8 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             wrong = page.locator("#material + .wrong")
             expect(wrong).to_contain_text("did you mean 'Ti-6Al-4V'")
             page.fill("#material", "Ti-6Al-4V")
+            expect(wrong).to_have_count(0)  # as soon as it is corrected
+            assert page.locator("#material").get_attribute("aria-invalid") is None
             page.fill("#ball-mm", "1,2")
             page.click("#propose")
             opened.wait('data-ended="0"')
@@ -48,6 +66,7 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             assert page.locator("#picture img").evaluate("one => one.naturalWidth") > 0
             opened.wait("data-chamber=proposal")  # it is seen in 3D too
             kinds = {"target", "sonotrode", "chamber wall"}
+            expect(page.locator("#legend")).to_contain_text("chamber wall")  # at the next frame
             assert set(page.locator("#legend li").all_text_contents()) >= kinds
             page.click("#rows-fold summary")
             shown = page.locator("#rows tr:has(th:text-is('Balls'))")
@@ -61,6 +80,7 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             assert page.locator("#view").screenshot() != before
             page.mouse.move(0, 0)
             expect(page.locator("#view")).not_to_have_attribute("data-highlight", "12")
+            assert page.evaluate(MARKED_BEFORE_POSED) == [0, -1, 5]
             page.reload()
             opened.wait('data-ended="0"')
             expect(page.locator("#sentence")).to_contain_text("my part.stl")

@@ -7,7 +7,14 @@ from pathlib import Path
 import pytest
 
 import chamberopt
-from chamberopt.page.page_words import TERMS, amplitudes_named, balls_named, explained, on_page
+from chamberopt.page.page_words import (
+    TERMS,
+    amplitudes_named,
+    balls_named,
+    explained,
+    names_met,
+    on_page,
+)
 
 
 @pytest.mark.parametrize(
@@ -26,6 +33,15 @@ def test_balls_and_amplitudes_are_those_that_would_serve(
 ) -> None:
     assert balls_named(matter) == balls
     assert amplitudes_named(matter) == amplitudes
+
+
+def test_surfaces_that_are_met_are_those_of_the_matter() -> None:
+    begin, end = "NOT MASKED: the shot also meets ", "; what has to keep its size takes a mask"
+    assert names_met(f"{begin}WEB (80 mm²), the rest of RIM 2 (3 mm² of it){end}") == [
+        "WEB", "RIM 2",
+    ]  # fmt: skip
+    assert names_met(f"{begin}WEB (80 mm²) and 3 more{end}") == []  # not all are named
+    assert names_met("BALLS JAM in gaps of 0.43 mm (2), as every size does; ask") == []
 
 
 def test_a_term_has_its_meaning_where_it_stands_first() -> None:
@@ -48,6 +64,25 @@ def test_a_command_is_named_as_the_page_has_it() -> None:
         ("a check with pilot runs, in a terminal", "chamberopt check --pilot"),
         "” tells more",
     ]
+
+
+@pytest.mark.parametrize(
+    ("printed", "told"),
+    [
+        ("finishing what runs, then stopping; press Ctrl-C again to stop now",
+         "finishing what runs, then stopping"),
+        ("to resume: chamberopt run fast.toml --out results/fast", ""),
+        ("results/fast: not finished; to resume it: chamberopt run fast.toml",
+         "results/fast: not finished"),
+        ("simulated at both ends (2 times the work); --no-ranges leaves them out",
+         "simulated at both ends (2 times the work)"),
+        ("and 3 more notes: --verbose shows all", "and 3 more notes"),
+        ("in the lid in place of the part, 8 mm from the sonotrode: chamberopt strip",
+         "in the lid in place of the part, 8 mm from the sonotrode"),
+    ],
+)  # fmt: skip
+def test_what_only_a_terminal_needs_is_left_out(printed: str, told: str) -> None:
+    assert on_page(printed) == ([told] if told else [])
 
 
 def test_commands_in_html_are_named_as_the_page_has_them() -> None:

@@ -111,7 +111,11 @@ def test_a_report_cannot_use_the_server(served: Served) -> None:
         ("/cavity", {"changes": {"part.mesh": "/etc/hosts"}}, "not changed on the page"),
         ("/shape", {"changes": {}, "read": "another"}, "reload it"),
         ("/start", {"command": "simulate", "of": "own.toml"}, "runs the Python file"),
-        ("/study", {"name": "-x.toml", "vary": {}, "evaluations": 3}, "give a name of letters"),
+        (
+            "/study",
+            {"name": "-x.toml", "vary": {}, "evaluations": 3},
+            "give a name of letters and digits",
+        ),
         ("/cavity", {"changes": {"part.offset_mm.0": 100}}, "part.offset_mm"),
         ("/reach", {"number": -5}, None),
         ("/candidates", {"folder": "../other"}, "outside the folder"),

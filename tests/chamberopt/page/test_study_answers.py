@@ -11,11 +11,13 @@ import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import load_design
+from chamberopt.page import further_study
 from chamberopt.page.acts import Acts, list_results
 from chamberopt.page.study_answers import candidate_answer, candidates_answer, model_answer
 from chamberopt.search.study import load_study
 from chamberopt.search.trial_log import read_trials
-from tests.helpers.results.followed_study import BUDGET, followed_study
+from tests.helpers.results.followed_study import BUDGET, Hill, followed_study
+from tests.helpers.studies import run_in_folder
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +55,13 @@ def test_every_candidate_is_there_as_the_log_has_it(out: Path) -> None:
     )
     assert kinds.count("refused") > 0
     assert [one["is_start"] for one in answer["candidates"]].index(True) == 0
+    (best,) = (one for one in answer["candidates"] if one["is_best"])
+    confirmed = {one.point: one for one in trials if one.stage == "confirm"}.values()
+    assert best["number"] == 1 + max(confirmed, key=lambda one: one.score).number
+    assert (best["standing"], answer["candidates"][0]["standing"]) == (
+        "the best so far",
+        "the start",
+    )
     for one, trial in zip(answer["candidates"], trials, strict=True):
         assert (one["objective"] is None) == (not trial.goals)
     scores = [one.goals[0].value for one in trials if one.goals and one.stage == "search"]
@@ -71,6 +80,16 @@ def test_figures_of_a_candidate_are_in_words_with_units_and_intervals(out: Path)
     assert candidate_answer(out, 1, other)["differs"] == ["Sonotrode amplitude [µm]"]
     with pytest.raises(InputError, match="not a candidate of study"):
         candidate_answer(out, 99, design)
+
+
+def test_the_time_that_a_candidate_needs_is_offered_with_its_numbers(copy: Path) -> None:
+    design = load_design(copy.parents[1] / "design.toml")
+    rows = [json.loads(line) for line in (copy / "history.jsonl").read_text().splitlines()]
+    time = {"value": 170.2, "half_width": 6.0}
+    rewritten(copy, 0, metrics=rows[0]["metrics"] | {"time_to_98_s": time})
+    assert candidate_answer(copy, 1, design)["time"] == {"process.treatment_time_s": 177.0}
+    known = design.changed({"process.treatment_time_s": 177.0})
+    assert candidate_answer(copy, 1, known)["time"] == {}
 
 
 def test_the_model_comes_with_its_check_or_the_reason_why_there_is_none(copy: Path) -> None:
@@ -147,16 +166,42 @@ def test_a_study_is_resumed_and_gone_on_with(acts: Acts, copy: Path) -> None:
     study = load_study(folder / "study-2.toml")
     best = max(read_trials(copy), key=lambda one: (one.stage == "search", one.score))
     assert study.begin_with == (best.parameters,)
-    assert (study.optimizer.evaluations, study.optimizer.seed) == (5, 2)
+    assert (study.optimizer.evaluations, study.optimizer.seed) == (7, 2)  # with start and best
     assert study.vary == load_study(folder / "study.toml").vary
     assert acts.more({**asked, "evaluations": 5})["arguments"][1] == "./study-3.toml"
-    with pytest.raises(InputError, match="evaluations"):
-        acts.more({**asked, "evaluations": 1})
+    with pytest.raises(InputError, match="new chambers to simulate: given 0"):
+        acts.more({**asked, "evaluations": 0})
     assert not (folder / "study-4.toml").exists()
 
     (folder / "study.toml").unlink()
     with pytest.raises(InputError, match="no study file here asks what this study asked"):
         acts.resume(asked)
+
+
+def test_a_further_study_tries_as_many_new_chambers_as_were_asked_for(
+    acts: Acts, copy: Path
+) -> None:
+    acts.more({"folder": "results/study", "evaluations": 3})
+    further = load_study(copy.parents[1] / "study-2.toml")
+    run_in_folder(further, copy.parent / "study-2", simulator=Hill())
+    before, after = (
+        {one.point for one in read_trials(folder) if one.stage == "search" and one.goals}
+        for folder in (copy, copy.parent / "study-2")
+    )
+    assert len(after - before) >= 3  # one that is told by few replicas costs less
+    for folder, other in (("study", "study-2"), ("study-2", "study")):
+        answer = acts.candidates({"folder": f"results/{folder}"})
+        assert answer["same"] == [f"results/{other}"]
+
+
+@pytest.mark.parametrize("ended", ["gain", "values"])
+def test_a_study_with_nothing_left_to_try_is_not_gone_on_with(
+    acts: Acts, copy: Path, monkeypatch: pytest.MonkeyPatch, ended: str
+) -> None:
+    monkeypatch.setattr(further_study, "is_finished", lambda _: True)
+    monkeypatch.setattr(further_study, "_ended_by", lambda _: ended)
+    with pytest.raises(InputError, match="search between wider values, or for another aim"):
+        acts.more({"folder": "results/study", "evaluations": 3})
 
 
 def test_a_folder_runs_no_python_file(acts: Acts, copy: Path) -> None:

@@ -56,6 +56,13 @@ def test_a_study_is_followed_and_a_candidate_taken(opened: Page, out: Path) -> N
     assert len(again) == 2
     assert all(named[named.index(one) - 1] == one.split()[0] for one in again)
     assert "a gap of 2.1 mm, in which balls jam" in " ".join(listed.all_text_contents())
+    best = page.locator("#study-of .rows tr.best")
+    expect(best).to_have_count(1)
+    expect(best).to_contain_text("the best so far")
+    expect(order.locator(".marks")).to_contain_text("the best so far")
+    repeated = next(k for k, one in enumerate(named) if one.endswith(" again"))
+    listed.nth(repeated).click()
+    expect(page.locator("#unsaved")).to_have_text(f"candidate {named[repeated]} is shown")
     listed.nth(0).click()
     opened.wait("data-candidate='1'")
     order.locator(".candidate[data-number='2'] .target").click()

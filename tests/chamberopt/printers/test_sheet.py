@@ -5,6 +5,7 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -91,6 +92,16 @@ def test_its_figures_are_those_of_the_report(folder: Path) -> None:
     result = load_result(folder)
     smooth = replace(result, design=result.design.changed({"effects.friction": "none"}))
     assert "Simulated without friction" in rows_of(smooth)["Not in these figures"][""]
+
+
+def test_what_the_best_costs_is_on_the_sheet(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    result = load_result(folder)
+    speed = result.metrics["mean_normal_speed_m_s"]
+    faster = Estimate(2.0 * speed.value, 0.1 * speed.value)
+    start = SimpleNamespace(metrics={"mean_normal_speed_m_s": faster}, seeds=[-1])
+    monkeypatch.setattr("chamberopt.documents.sheet.load_start", lambda _: start)
+    told = rows_of(result)["Peening, and what to expect"][""]
+    assert "It peens less hard than the start: the mean normal speed of the impacts" in told
 
 
 def test_what_to_measure_first_without_a_calibration(folder: Path) -> None:

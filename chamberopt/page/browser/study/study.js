@@ -15,10 +15,17 @@ export function followStudy(of) {
   pair = [];
   find("study-title").textContent = folder;
   find("study-of").replaceChildren();
+  find("study-same").hidden = true;
   find("tried").textContent = find("study-sentence").textContent = "";
   find("chosen-candidate").replaceChildren(element("p", { className: "soft", textContent: "Click a point to see its numbers, and its chamber above." }));
   find("study-view").hidden = false;
   look();
+}
+
+function toStudy(other) {
+  const button = element("button", { type: "button", textContent: other });
+  button.addEventListener("click", () => followStudy(other));
+  return button;
 }
 
 function closeStudy() {
@@ -40,6 +47,8 @@ async function look() {
     if (now.candidates) {
       data = prepared(now);
       find("tried").textContent = find("study-sentence").textContent = data.sentence;
+      find("study-same").hidden = !data.same.length;
+      find("study-same").replaceChildren("Other candidates for the same question are in ", ...data.same.flatMap((other) => [toStudy(other), " "]));
       draw();
       model = await ask("/model", { folder: mine }).catch(({ message }) => ({ reason: message })); // its design may be elsewhere
       if (mine !== folder) return;
@@ -67,9 +76,10 @@ function prepared(now) {
   }
   return { ...now, axes };
 }
+const BEST = "#b3261e"; // ring round the best
 const isCross = (kind) => !["simulated", "confirmed"].includes(kind);
 const short = (x) => String(Number(x.toPrecision(3)));
-const mark = (one) => ({ ...one.mark, ring: one.number === chosen ? "#1c2226" : one.is_start ? data.colours.start : "" });
+const mark = (one) => ({ ...one.mark, ring: one.number === chosen ? "#1c2226" : one.is_best ? BEST : one.is_start ? data.colours.start : "" });
 
 // Width of a plot [px]: that of the panel, or half of it.
 const wide = () => Math.max(320, find("study-of").clientWidth);
@@ -93,8 +103,8 @@ function draw() {
 function table() {
   const cells = (tag, texts) => texts.map((one) => element(tag, {}, ...[one].flat()));
   const rows = data.candidates.toSorted((a, b) => a.of - b.of || a.number - b.number).map((one) => {
-    const row = element("tr", { className: one.number === chosen ? "chosen" : "" },
-      ...cells("td", [one.name, ...data.axes.map(({ name }) => String(one.values[name] ?? "")), one.told, [one.is_start ? "the start" : WORDS[one.kind], ...(one.reason.length ? [": ", ...onPage(one.reason)] : [])]]));
+    const row = element("tr", { className: [one.number === chosen && "chosen", one.is_best && "best"].filter(Boolean).join(" ") },
+      ...cells("td", [one.name, ...data.axes.map(({ name }) => String(one.values[name] ?? "")), one.told, [[one.standing, one.is_start ? "" : WORDS[one.kind]].filter(Boolean).join(", "), ...(one.reason.length ? [": ", ...onPage(one.reason)] : [])]]));
     row.dataset.number = one.number;
     return row;
   });
@@ -108,10 +118,11 @@ function inOrder() {
   plot.steps(data.best, last, colours.simulated);
   for (const one of candidates) plot.candidate(one, one.of === one.number ? one.of : one.of + 0.2, one.objective, mark(one));
   const kinds = Object.keys(WORDS).filter((kind) => candidates.some((one) => one.kind === kind));
-  const marks = [[colours.start, false, "the start"], ...kinds.map((kind) => [colours[kind], isCross(kind), WORDS[kind]])];
+  const best = candidates.filter((one) => one.is_best).map((one) => [BEST, false, `ring: ${one.standing}, candidate ${one.name}`]);
+  const marks = [...best, [colours.start, false, "the start"], ...kinds.map((kind) => [colours[kind], isCross(kind), WORDS[kind]])];
   return [figure("Every candidate in its order, with its 95 % interval; the line is the best so far, as searched. What is confirmed stands beside its candidate.", plot.drawing,
     element("ul", { className: "marks" }, ...marks.map(([colour, cross, text]) => {
-      const sign = element("b", { textContent: cross ? "✕" : "●" });
+      const sign = element("b", { textContent: cross ? "✕" : colour === BEST ? "○" : "●" });
       sign.style.color = colour;
       return element("li", {}, sign, ` ${text}`);
     })))];
@@ -208,14 +219,19 @@ async function choose(number) {
   const one = await ask("/candidate", { folder, number });
   if (number !== chosen) return;
   const rows = (pairs) => element("table", {}, ...pairs.map(([name, text]) => element("tr", {}, element("th", { textContent: name }), element("td", { textContent: text }))));
-  const take = element("button", { id: "take", textContent: "Take these numbers into the design" });
-  take.addEventListener("click", () => { change(one.values); say("taken: save the design, or undo", true); });
+  const taking = (id, textContent, values) => {
+    const button = element("button", { id, textContent });
+    button.addEventListener("click", () => { change(values); say("taken: save the design, or undo", true); });
+    return button;
+  };
+  const take = taking("take", "Take these numbers into the design", one.values), [time] = Object.values(one.time);
+  const timed = time ? [" ", taking("take-time", `Take them with ${time} s of peening, which are enough for it`, { ...one.values, ...one.time })] : [];
   const other = one.differs.length ? [element("p", { className: "warning", textContent: `The open design is not the one of this study: it differs in ${one.differs.slice(0, 4).join(", ")}${one.differs.length > 4 ? ` and ${one.differs.length - 4} more` : ""}. The chamber shown is that of the open design with these numbers.` })] : [];
   find("chosen-candidate").replaceChildren(element("h3", { textContent: `Candidate ${data.candidates[number - 1].name}` }),
     element("p", { textContent: `${WORDS[one.kind]}${one.reason ? `: ${one.reason}` : ""}` }), ...other,
-    rows(one.numbers), element("p", {}, take), rows(one.figures));
+    rows(one.numbers), element("p", {}, take, ...timed), rows(one.figures));
   document.body.dataset.candidate = String(number);
-  show(one.values, `candidate ${number} is shown`);
+  show(one.values, `candidate ${data.candidates[number - 1].name} is shown`);
 }
 
 find("study-stop").addEventListener("click", () => attempt(() => ask("/stop", {})));

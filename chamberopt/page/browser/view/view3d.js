@@ -2,6 +2,7 @@
 "use strict";
 THREE.ColorManagement.enabled = false; // a colour on the screen is the one of the colour bar
 const TEXT_HEIGHT = 0.0115; // over its distance: 2.2 % of the view's height
+const TEXT_PX = 15; // least height on the screen, so that a text is read in a small view too
 const OPACITY = { wall: 0.16, sonotrode: 0.9 }; // of the kinds that are seen through
 const FROM_BELOW = 0.08; // opacity of the sonotrode before the part
 const WIDE = 0.7; // width over height of a view that shows all, also what is as wide as its diagonal
@@ -9,6 +10,7 @@ const END_ON = 0.97; // cosine between sight and a dimension from which on it is
 class View3D {
   #meshes = new Map();
   #waiting = false;
+  #press = null; // hears where the page is pressed
   #heard = [];
   #clicked = [];
   #kinds = { now: "", hear: null };
@@ -30,6 +32,7 @@ class View3D {
     sun.position.set(-0.4, 0.5, 1);
     this.camera.add(sun);
     this.scene.add(this.camera, new THREE.AmbientLight(0xffffff, 2.4));
+    this.#takeWheel(renderer.domElement);
     this.orbit = new THREE.OrbitControls(this.camera, renderer.domElement);
     this.orbit.addEventListener("change", () => { this.draw(); for (const hear of this.#heard) hear(); });
     this.triad = new THREE.Scene();
@@ -49,6 +52,16 @@ class View3D {
     });
     new ResizeObserver(() => this.#resize()).observe(element);
     this.#resize();
+  }
+
+  // The wheel zooms after a click in the view, or with Ctrl; else it scrolls the page.
+  #takeWheel(canvas) {
+    let isOurs = false;
+    this.#press = (event) => { isOurs = event.target === canvas; };
+    document.addEventListener("pointerdown", this.#press, { capture: true });
+    canvas.addEventListener("wheel", (event) => {
+      if (!isOurs && !event.ctrlKey) event.stopImmediatePropagation();
+    }, { capture: true, passive: true });
   }
 
   static lineOf(points, colour) {
@@ -162,7 +175,17 @@ class View3D {
     mesh.matrixAutoUpdate = false;
     mesh.matrix.set(r[0], r[1], r[2], s[0], r[3], r[4], r[5], s[1], r[6], r[7], r[8], s[2], 0, 0, 0, 1);
     mesh.matrixWorldNeedsUpdate = true;
+    this.#lay(name);
     this.draw();
+  }
+
+  // Put what marks a surface where the surface is.
+  #lay(name) {
+    const marked = this.get("highlight");
+    if (marked?.userData.of !== name) return;
+    marked.matrixAutoUpdate = false;
+    marked.matrix.copy(this.get(name).matrix);
+    marked.matrixWorldNeedsUpdate = true;
   }
 
   // Mark triangles of a surface, also where they are hidden; null for none.
@@ -177,9 +200,8 @@ class View3D {
     marked.material.color.set(colour);
     Object.assign(marked.material, { depthTest: false });
     marked.renderOrder = 1;
-    marked.matrixAutoUpdate = false;
-    marked.matrix.copy(mesh.matrix);
-    marked.matrixWorldNeedsUpdate = true;
+    marked.userData.of = name;
+    this.#lay(name);
   }
 
   // Names and surfaces, lines and texts.
@@ -350,9 +372,11 @@ class View3D {
       const { along } = mesh.userData, isEndOn = along && Math.abs(sight.dot(new THREE.Vector3(...along))) > END_ON;
       mesh.traverse((one) => { one.layers.set(isEndOn ? 1 : 0); }); // the camera sees the layer 0
     }
-    const height = TEXT_HEIGHT * this.element.clientHeight / (2 * Math.tan(this.camera.fov * Math.PI / 360));
+    const usual = TEXT_HEIGHT * this.element.clientHeight / (2 * Math.tan(this.camera.fov * Math.PI / 360));
+    const height = Math.max(usual, TEXT_PX), scale = TEXT_HEIGHT * height / usual;
     const texts = all.filter(({ userData, visible }) => userData.isText && visible).flatMap(({ children }) => children);
     for (const one of texts.sort((a, b) => b.renderOrder - a.renderOrder)) {
+      one.scale.set(scale * one.scale.x / one.scale.y, scale, 1);
       const width = height * one.scale.x / one.scale.y, [x, y] = this.onScreen(one.position);
       const left = x - one.center.x * width, top = y - (1 - one.center.y) * height;
       const isOver = taken.some(([l, t, w]) => left < l + w && l < left + width && top < t + height && t < top + height);
@@ -374,6 +398,7 @@ class View3D {
   dispose() {
     for (const name of [...this.#meshes.keys()]) this.remove(name);
     this.orbit.dispose();
+    document.removeEventListener("pointerdown", this.#press, { capture: true });
     this.renderer.dispose();
     this.renderer.forceContextLoss();
     this.renderer.domElement.remove();
