@@ -25,6 +25,9 @@ MARKED_BEFORE_POSED = """() => {
 }"""
 
 
+IS_LOADED = "document.querySelector('#picture img').naturalWidth > 0"
+
+
 def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path) -> None:
     served = Served(tmp_path)
     dropped = tmp_path / "elsewhere" / "my part.stl"
@@ -63,7 +66,7 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             page.click("#propose")
             opened.wait('data-ended="0"')
             expect(page.locator("#sentence")).to_contain_text("Peen face 1 (")
-            assert page.locator("#picture img").evaluate("one => one.naturalWidth") > 0
+            page.wait_for_function(IS_LOADED)
             opened.wait("data-chamber=proposal")  # it is seen in 3D too
             kinds = {"target", "sonotrode", "chamber wall"}
             expect(page.locator("#legend")).to_contain_text("chamber wall")  # at the next frame
