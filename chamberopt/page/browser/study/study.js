@@ -79,7 +79,7 @@ function prepared(now) {
 const BEST = "#b3261e"; // ring round the best
 const isCross = (kind) => !["simulated", "confirmed"].includes(kind);
 const short = (x) => String(Number(x.toPrecision(3)));
-const mark = (one) => ({ ...one.mark, ring: one.number === chosen ? "#1c2226" : one.is_best ? BEST : one.is_start ? data.colours.start : "" });
+const mark = (one) => ({ ...one.mark, ring: one.number === chosen ? "#1c2226" : one.is_best ? BEST : "" });
 
 // Width of a plot [px]: that of the panel, or half of it.
 const wide = () => Math.max(320, find("study-of").clientWidth);
