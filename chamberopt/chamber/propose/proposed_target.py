@@ -161,6 +161,7 @@ PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 # of their middles along both axes of their plane differ by less than RING.
 LARGE_PATTERN, RING = 0.1, 0.1
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
+BY_PROGRAM = re.compile(r"(?:created|exported|generated|written)[\s_-]+(?:by|from|with)\b", re.I)
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
 FACE = re.compile(r"face (\d+)", re.I)
 # A fillet is a hollow face of a CAD file that goes on smoothly at this share of its border or more,
@@ -215,6 +216,8 @@ def named_surfaces(mesh: PartMesh) -> list[Surface]:
         return COLOUR.match(one[0]) is not None, NUMBERED.match(one[0]) is not None, len(one[0])
 
     for name, marked in sorted(mesh.groups.items(), key=plainness):
+        if BY_PROGRAM.match(name):  # names a program, and no surface
+            continue
         same = named.get(marked.tobytes())
         colour = name if COLOUR.match(name) else ""
         if same is not None:

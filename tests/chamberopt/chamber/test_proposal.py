@@ -126,6 +126,7 @@ ALL = (0, 1, 2, 3, 4, 5)
         ({"SIDE": 0, "#ff2010": ALL}, [], ["SIDE"]),
         ({"PEEN_ME": 4, "SIDE": 0, "#ff0000": 0}, [], ["PEEN_ME"]),
         ({"UNPEENED": 0, "FREE": 4}, [], ["FREE"]),
+        ({"Created by Gmsh": (0, 1, 2, 3), "FREE": 4}, [], ["FREE"]),
         ({"do not peen": 0, "NOT_TO_PEEN": 1, "no target": 2, "mask": 3, "FREE": 4}, [], ["FREE"]),
         ({"nicht zu strahlen": 0, "ungestrahlt": 1, "Strahlen": 4}, [], ["Strahlen"]),
         ({"No. 5 target": 4, "SIDE": 0}, [], ["No. 5 target"]),
