@@ -129,13 +129,10 @@ def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[An
     for name, own in fixtures.items():
         glass &= ~own
         body = chamber.extract_cells(own).extract_surface(algorithm="dataset_surface")
-        body = (
-            pyvista()
-            .PolyData.from_regular_faces(  # with its normals into the cavity
-                body.points, np.asarray(body.regular_faces)[:, ::-1]
-            )
-            .fill_holes(body.length)
-        )  # where it goes on in the wall or lies on the part
+        body = pyvista().PolyData.from_regular_faces(  # with its normals into the cavity
+            body.points, np.asarray(body.regular_faces)[:, ::-1]
+        )
+        body = body.fill_holes(body.length)  # where it goes on in the wall or lies on the part
         look = {"color": FIXTURE_COLOURS[name], "ambient": 0.45, "diffuse": 0.6, **style}
         actors.append(plotter.add_mesh(body, **look))
     wall = chamber.extract_cells(glass).extract_surface(algorithm="dataset_surface")

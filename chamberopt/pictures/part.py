@@ -105,13 +105,11 @@ def draw_part(
         marked: which triangles belong to the target, shape (n,).
         edges: lines drawn red and visible through the part [m], shape (k, 2, 3).
         missed: which triangles of the target balls can hardly touch, shape (n,).
-        chamber: the chamber, drawn as glass round the part in a further view, with dimensions.
+        chamber: the chamber, drawn as glass round the part in a further view, with dimensions; if
+            it has steps, in a view of each pose.
         softness: restitution of the part over that of a rigid one, shape (n,), where it is thin.
             A second row of views shows it on the target.
         is_held_outside: True if the part is clamped where it stands out of the chamber.
-
-    A chamber with steps has a view of each pose.
-
     Returns:
         None, or one line that says why there is no picture.
     Raises:
@@ -218,9 +216,7 @@ def _panels(
     edges = job["edges"]
     lines = pyvista().line_segments_from_points(edges.reshape(-1, 3)) if len(edges) else None
 
-    def add(
-        plotter: Any, part: Surface = part, shown: list[tuple[Surface, np.ndarray]] = shown
-    ) -> None:
+    def add_pose(part: Surface, shown: list[tuple[Surface, np.ndarray]], plotter: Any) -> None:
         for level, (surface, kind) in enumerate(shown):
             for k in np.unique(kind):
                 actor = plotter.add_mesh(
@@ -234,6 +230,7 @@ def _panels(
         else:
             add_edges(plotter, part)
 
+    add = partial(add_pose, part, shown)
     surface, kind = shown[-1]
     target, rest = cells_of(surface, kind != PLAIN), [part]
     if not target.n_cells:  # the part has faults, or lies outside the chamber
@@ -253,7 +250,7 @@ def _panels(
         return [whole, *without_twin(of_target)]
     others = [
         chamber_panel(
-            partial(add, part=own, shown=of_pose), own, one["chamber"], eye, f"in pose {number}"
+            partial(add_pose, own, of_pose), own, one["chamber"], eye, f"in pose {number}"
         )
         for number, (one, own, of_pose) in enumerate(poses, start=2)
     ]

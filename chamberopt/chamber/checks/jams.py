@@ -75,10 +75,12 @@ def find_gaps(chamber: Chamber, diameters: Sequence[float], beside_walls: bool =
             alone. They are measured from the walls: a ball between both faces touches both.
     """
     limit, mesh = MEASURED_WIDTH * 0.5 * max(diameters), chamber_mesh(chamber)
-    part, normals = chamber.part, None
-    if not beside_walls:
-        normals = part.normals_in_cavity(chamber.vertices, chamber.triangles, chamber.source)
-    chosen = mesh.tags != TAG_PART if beside_walls else None
+    chosen = normals = None
+    if beside_walls:  # which are as their facets
+        chosen = mesh.tags != TAG_PART
+    else:
+        surface = chamber.vertices, chamber.triangles, chamber.source
+        normals = chamber.part.normals_in_cavity(*surface)
     touches, spacing = find_touches(mesh, min(diameters), limit, normals, chosen)
     return _gaps(touches, None, spacing, min(diameters))
 

@@ -31,7 +31,7 @@ class Opening(NamedTuple):
     size: tuple[float, float]  # of the box round it in the wall, level side first [m]
     place: tuple[float, float, float]  # middle of that box, in the chamber's frame [m]
     beyond: float  # how far the part stands out, square to the wall [m]
-    way: tuple[float, float, float] = (0.0, 0.0, 1.0)  # unit vector square to the wall, outwards
+    way: tuple[float, float, float]  # unit vector square to the wall, outwards
 
 
 def find_openings(chamber: Chamber) -> list[Opening]:

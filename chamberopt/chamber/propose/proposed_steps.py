@@ -121,17 +121,17 @@ def turned_over(made: Proposal) -> Proposal:
 
     Raises InputError if what holds the part does not hold it then.
     """
-    found: list[tuple[Proposal, str]] = []
+    found: list[tuple[int, bool, Proposal, str]] = []
     for axis in OVER:
         with suppress(InputError):
-            found.append((_turned_about(made, axis), axis))
-            if not moved_openings(found[-1][0].chamber):
+            two = _turned_about(made, axis)
+            moves = bool(moved_openings(two.chamber))
+            found.append((faults(two)[0], moves, two, axis))
+            if not moves:
                 break
     if not found:
         raise InputError("what holds it in this pose does not hold it turned over")
-    two, axis = min(
-        found, key=lambda one: (faults(one[0])[0], bool(moved_openings(one[0].chamber)))
-    )
+    *_, two, axis = min(found, key=lambda one: one[:2])
     if any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air:
         raise InputError("nothing would hold it")
     over = f"turned over about {axis} after half of the time, as what looks up gets few dents"

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from chamberopt.chamber.fixture import is_hole
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.meshes.part_mesh import PartMesh, select_triangles
@@ -310,11 +311,10 @@ def _is_ring(mesh: PartMesh, alike: Surface) -> bool:
 def _is_inside(mesh: PartMesh, face: Surface) -> bool:
     """Return whether a face is the inside of a tube, which looks at itself all round."""
     triangles = mesh.triangles[face.triangles]
-    vectors, middle = area_vectors(mesh.vertices, triangles), mesh.vertices[triangles].mean(axis=1)
-    size = np.linalg.norm(vectors, axis=1)
-    out = middle - np.average(middle, axis=0, weights=size)
-    is_round = np.linalg.norm(vectors.sum(axis=0)) < ALL_ROUND * size.sum()
-    return bool(is_round and np.einsum("ij,ij->", out, vectors) < 0.0)
+    vectors = area_vectors(mesh.vertices, triangles)
+    size = float(np.linalg.norm(vectors, axis=1).sum())
+    is_round = np.linalg.norm(vectors.sum(axis=0)) < ALL_ROUND * size
+    return bool(is_round and is_hole(mesh.vertices, triangles))
 
 
 def _faces(mesh: PartMesh) -> list[Surface]:

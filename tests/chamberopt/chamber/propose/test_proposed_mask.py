@@ -64,7 +64,7 @@ def test_sharp_edges_are_those_of_the_target_that_turn_outwards() -> None:
 
 
 def test_openings_that_move_in_a_second_pose_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    here = Opening("the wall", (0.02, 0.01), (0.03, 0.0, 0.015), 0.02)
+    here = Opening("the wall", (0.02, 0.01), (0.03, 0.0, 0.015), 0.02, (1.0, 0.0, 0.0))
     up = here._replace(place=(0.03, 0.0, 0.017))
     top = here._replace(wall="the ceiling")
 
