@@ -36,6 +36,7 @@ from chamberopt.design.shape_surface import (
     further_sonotrode_tag,
     is_sonotrode,
 )
+from chamberopt.geometry.heights import lowest_over
 from chamberopt.geometry.meshes.surface_error import SurfaceError, format_box, format_point
 from chamberopt.geometry.slivers import MIN_HEIGHT, remove_slivers
 from chamberopt.geometry.solids import (
@@ -98,6 +99,11 @@ class Chamber:
     def height(self) -> float:
         """Height of the cavity's highest point over the sonotrode [m]."""
         return float(self.vertices[:, 2].max())
+
+    @property
+    def lowest_of_part(self) -> float:
+        """Height of the lowest point of the part in the cavity over the sonotrode [m]."""
+        return float(self.vertices[self.triangles[self.tags == TAG_PART], 2].min())
 
     @cached_property
     def mesh(self) -> TriangleMesh:
@@ -204,6 +210,7 @@ def _build_one(design: Design, target: np.ndarray | None) -> Chamber:
     notes += design.chamber.notes(design.shot.diameter)
     shape = design.chamber.surface(part.vertices, part.triangles)
     _refuse_misplaced_part(part, shape, design)
+    notes += _beside_sonotrode(part, design)
 
     cavity = filled = cavity_solid(design, shape, deflectors)
     notes += [note for one in deflectors for note in one.notes]
@@ -325,6 +332,29 @@ def _refuse_misplaced_part(part: Part, shape: ShapeSurface, design: Design) -> N
         )
 
 
+def _beside_sonotrode(part: Part, design: Design) -> list[str]:
+    """Return a note on a part that reaches below the sonotrode's face outside of the walls.
+
+    Raises InputError if it reaches so low over a face that is larger than the floor.
+    """
+    lowest, amplitude = float(part.vertices[:, 2].min()), design.sonotrode.largest_amplitude
+    if lowest > amplitude:
+        return []
+    face = design.sonotrode.face
+    if face is not None:
+        over = lowest_over(part.vertices, part.triangles, face.outline)
+        if over <= amplitude:
+            raise InputError(
+                f"sonotrode.face: {face.in_words} is larger than the floor, and outside of the "
+                f"walls the part reaches down to {1e3 * over:.3g} mm over it, so that it would be "
+                "hit; take a smaller sonotrode, or turn or move the part"
+            )
+    return [
+        f"{part.name}: outside of the walls it reaches {-1e3 * lowest:.3g} mm below the "
+        "sonotrode's face: nothing of the machine may be there"
+    ]
+
+
 def _refuse_free_edges(design: Design, room: SolidSurface, tags: np.ndarray) -> None:
     """Raise InputError if a sonotrode is cut off from the room or has an edge without a wall.
 
@@ -357,20 +387,25 @@ def floor_sides_mm(vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray
 
 
 def _refuse_bare_floor(design: Design, room: SolidSurface, tags: np.ndarray) -> None:
-    """Raise InputError if the floor is larger than the blocks of which it is made.
+    """Raise InputError if the floor is larger than the face on which the chamber stands.
 
     Args:
         room: surface of the cavity.
         tags: kind of surface of its triangles (part, sonotrode or wall), (k,).
     """
-    blocks = design.sonotrode.blocks
-    if blocks is None:
+    face = design.sonotrode.face
+    if face is None:
         return
-    x, y = floor_sides_mm(room.vertices, room.triangles, tags)
-    if (np.array([x, y]) > np.array(blocks.sides_mm) + 2e3 * MIN_HEIGHT).any():
+    if face.size_mm is None:
+        floor = room.vertices[np.unique(room.triangles[tags == TAG_SONOTRODE]), :2]
+        needed = np.full(2, 2e3 * np.linalg.norm(floor, axis=1).max())
+    else:
+        needed = floor_sides_mm(room.vertices, room.triangles, tags)
+    if (needed > np.array(face.sides_mm) + 2e3 * MIN_HEIGHT).any():
+        size = " × ".join(f"{one:.4g}" for one in dict.fromkeys(needed))
         raise InputError(
-            f"sonotrode.blocks: {blocks.in_words}, but the floor needs {x:.4g} × {y:.4g} mm about "
-            "the axis; give more or larger blocks, or a smaller floor"
+            f"sonotrode.face: {face.in_words}, but the floor needs {size} mm about the axis; give "
+            "a larger one, or more blocks, or a smaller floor"
         )
 
 

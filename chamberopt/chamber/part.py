@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -14,6 +15,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.cut import cut_at_box
 from chamberopt.geometry.faces import Faces
+from chamberopt.geometry.heights import lowest_over
 from chamberopt.geometry.meshes.part_mesh import (
     PartMesh,
     keep_part,
@@ -223,8 +225,8 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
 
     The part is turned about the file's x, then y, then z. Its bounding box is centred on the
     chamber's axis and moved sideways by part.offset_mm. The part is raised or lowered until its
-    lowest point is chamber.sonotrode_distance_mm above the sonotrode. A part that is drawn with its
-    chamber stays as drawn.
+    lowest point within the walls is chamber.sonotrode_distance_mm above the sonotrode: what goes
+    out through the walls may be lower. A part that is drawn with its chamber stays as drawn.
 
     Raises:
         InputError: the file cannot be used, or the target is empty.
@@ -238,7 +240,7 @@ def posed_part(design: Design) -> tuple[Part, list[str]]:
     surface = table.target.model_copy(update={"reachable": False})
     found = _simulated(given, surface, table.smoothing, design.zones, _is_wall(design))
     mesh, origin = found.mesh, found.origin
-    turn, shift = _pose(given, mesh.vertices, design)
+    turn, shift = _pose(given, mesh, design)
     vertices = snap_to_grid(mesh.vertices @ turn.T + shift)
     thickness: np.ndarray | None = None
     thin_notes: list[str] = []
@@ -351,7 +353,7 @@ def preview_part(design: Design) -> PartPreview:
         one.name: _chosen(mesh, one.target, f"zones.{k}.target")
         for k, one in enumerate(design.zones)
     }
-    return PartPreview(mesh, *_pose(mesh, mesh.vertices, design), target, zones)
+    return PartPreview(mesh, *_pose(mesh, mesh, design), target, zones)
 
 
 def chosen_on_part(design: Design, wanted: Selection, field: str) -> np.ndarray:
@@ -553,13 +555,13 @@ def _find_origin(mesh: PartMesh, corners: np.ndarray, source: np.ndarray) -> np.
     return origin
 
 
-def _pose(given: PartMesh, vertices: np.ndarray, design: Design) -> tuple[np.ndarray, np.ndarray]:
+def _pose(given: PartMesh, mesh: PartMesh, design: Design) -> tuple[np.ndarray, np.ndarray]:
     """Return the rotation (3, 3), then shift (3,) [m], from the part file's frame to the chamber's.
 
     Args:
         given: the part as its file has it. The middle of its bounding box comes onto the axis.
-        vertices: vertices of the simulated part [m], (n, 3). Their lowest point counts, because
-            vertices on a round may reach a little further than its facets.
+        mesh: the part as it is simulated. Its lowest point counts, because vertices on a round may
+            reach a little further than its facets.
     """
     setup, distance = design.chamber.setup(), design.chamber.sonotrode_distance
     if setup is not None:
@@ -567,6 +569,11 @@ def _pose(given: PartMesh, vertices: np.ndarray, design: Design) -> tuple[np.nda
     turn = rotation_matrix(design.part.rotate_deg)
     of_file = given.vertices @ turn.T
     low, high = of_file.min(axis=0), of_file.max(axis=0)
-    x, y = design.part.offset
-    foot = np.r_[(low[:2] + high[:2]) / 2.0, (vertices @ turn.T)[:, 2].min()]
-    return turn, np.array([x, y, distance]) - foot
+    middle = (low[:2] + high[:2]) / 2.0
+    aside = np.array(design.part.offset) - middle
+    posed, plan = mesh.vertices @ turn.T, design.chamber.plan()
+    lowest = float(posed[:, 2].min())
+    if plan is not None:
+        within = lowest_over(posed, mesh.triangles, plan - aside)
+        lowest = within if math.isfinite(within) else lowest  # no part in it: refused when built
+    return turn, np.array([*design.part.offset, distance]) - np.r_[middle, lowest]

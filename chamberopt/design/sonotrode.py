@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field
 
 from chamberopt.common.toml_errors import Problem
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 MAX_POINTS = 50  # points of a profile
 MAX_SHARE = 2.0
 MAX_BLOCKS = 20  # in a row
+ROUND = 64  # corners about a disc
 LEAST_LARGEST = 0.1  # of the shares: with less, amplitude_um is not that of the face
 POINTS = (
     "pairs [mm from the middle, share], from 0 to the rim, e.g. [[0, 1], [20, 0.97], [35, 0.9]]"
@@ -185,34 +187,74 @@ class VibratingFace(FileTable):
         return self.peak_speed if profile is None else self.peak_speed * profile.rms
 
 
-class Blocks(FileTable):
-    """Equal blocks side by side on the chamber's axis, each a sonotrode, which make up the floor.
+class Face(FileTable):
+    """The whole face on which the chamber stands: a disc or a block, or blocks side by side.
 
-    They are simulated as one face that moves alike all over. No ball enters the joints.
+    Its middle is on the chamber's axis. The walls stand on it or go round it, so that the floor is
+    the face or a part of it. Blocks are simulated as one face that moves alike all over, and no
+    ball enters their joints.
     """
 
-    size_mm: Pair = list_field("two numbers [x, y] in mm", "sides of one block")
-    columns: int = Field(1, ge=1, le=MAX_BLOCKS, description="of blocks, side by side along x")
-    rows: int = Field(1, ge=1, le=MAX_BLOCKS, description="of blocks, side by side along y")
+    name: str = Field(default="", max_length=100, description="what the shop calls the sonotrode")
+    diameter_mm: float | None = quantity(5, 2000, "mm", "of a round face", None)
+    size_mm: Pair | None = list_field("two numbers [x, y] in mm", "sides of a block", None)
+    columns: int = Field(
+        default=1, ge=1, le=MAX_BLOCKS, description="of blocks, side by side along x"
+    )
+    rows: int = Field(default=1, ge=1, le=MAX_BLOCKS, description="of blocks, side by side along y")
 
     def _problems(self) -> Iterator[Problem]:
-        if not all(5.0 <= one <= 2000.0 for one in self.size_mm):
+        if not self.name.isprintable():
+            yield Problem("name", "has a line break or a control character; leave it out")
+        if (self.diameter_mm is None) == (self.size_mm is None):
+            yield Problem("diameter_mm", "give it for a disc, or size_mm for a block: one of them")
+        if self.size_mm is not None and not all(5.0 <= one <= 2000.0 for one in self.size_mm):
             yield Problem("size_mm", f"given {list(self.size_mm)}; allowed: 5 to 2000 mm each")
+        if self.size_mm is None and self.count > 1:
+            text = "given for a disc; only blocks (size_mm) make up one floor side by side"
+            yield Problem("columns", text)
+
+    @property
+    def block_mm(self) -> tuple[float, float]:
+        """Lengths along x and y of one block; of a disc twice its diameter."""
+        return self.size_mm or (self.diameter_mm or math.nan,) * 2
 
     @property
     def sides_mm(self) -> tuple[float, float]:
-        """Lengths of all blocks together along x and y."""
-        return self.columns * self.size_mm[0], self.rows * self.size_mm[1]
+        """Lengths along x and y of the disc or of all blocks together."""
+        x, y = self.block_mm
+        return self.columns * x, self.rows * y
 
     @property
     def count(self) -> int:
-        """Number of all blocks."""
+        """Number of all blocks; 1 for a disc."""
         return self.columns * self.rows
+
+    @property
+    def area_mm2(self) -> float:
+        """Length times width."""
+        return math.prod(self.sides_mm)
+
+    @property
+    def turned(self) -> Self:
+        """The same face turned by 90 degrees."""
+        x, y = self.block_mm
+        size = None if self.size_mm is None else (y, x)
+        return self.model_copy(update={"size_mm": size, "columns": self.rows, "rows": self.columns})
+
+    @property
+    def outline(self) -> np.ndarray:
+        """Corners (n, 2) [m] of the face, counter-clockwise; a disc lies within its corners."""
+        half = 5e-4 * np.array(self.sides_mm)
+        if self.size_mm is not None:
+            return np.asarray(half * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]]))
+        angle = 2.0 * np.pi * np.arange(ROUND) / ROUND
+        return np.asarray(half / np.cos(np.pi / ROUND) * np.c_[np.cos(angle), np.sin(angle)])
 
     @property
     def joints_mm(self) -> tuple[list[float], list[float]]:
         """Places of the joints between columns along x, and between rows along y."""
-        (x, y), (long, wide) = self.size_mm, self.sides_mm
+        (x, y), (long, wide) = self.block_mm, self.sides_mm
         return (
             [k * x - 0.5 * long for k in range(1, self.columns)],
             [k * y - 0.5 * wide for k in range(1, self.rows)],
@@ -220,19 +262,24 @@ class Blocks(FileTable):
 
     @property
     def in_words(self) -> str:
-        """Number and size, such as 4 blocks of 80 × 80 mm side by side, 2 × 2."""
-        x, y = self.size_mm
-        grid = f"{self.columns} × {self.rows}"
+        """Number, size and name, such as 4 blocks of 80 × 80 mm side by side, 2 × 2 (block A)."""
+        size = " × ".join(f"{one:g}" for one in dict.fromkeys(self.block_mm))
+        if self.count == 1 and self.name:
+            return f'"{self.name}" ({size} mm)'
+        if self.count == 1:
+            return f"a {'disc' if self.size_mm is None else 'block'} of {size} mm"
+        x, y = self.block_mm
+        grid = f"{self.columns} × {self.rows}" + (f" ({self.name})" if self.name else "")
         return f"{self.count} blocks of {x:g} × {y:g} mm side by side, {grid}"
 
 
 class Sonotrode(VibratingFace):
     """The first sonotrode, which is the vibrating floor of the chamber."""
 
-    blocks: Blocks | None = Field(
+    face: Face | None = Field(
         default=None,
-        description="blocks of which the floor is made: { size_mm = [80, 80], columns = 2 }; "
-        "absent: the floor is one sonotrode",
+        description="on which the chamber stands: { diameter_mm = 70 } or, of blocks, "
+        "{ size_mm = [80, 80], columns = 2 }; absent: not known, and no larger than the floor",
     )
 
     motion: Literal["sinusoidal", "random_phase"] = Field(
@@ -242,7 +289,7 @@ class Sonotrode(VibratingFace):
 
     def _problems(self) -> Iterator[Problem]:
         yield from super()._problems()
-        if self.blocks is not None and self.amplitude_profile is not None:
+        if self.face is not None and self.face.count > 1 and self.amplitude_profile is not None:
             text = "given beside blocks, each of which has its own: not supported; leave one out"
             yield Problem("amplitude_profile", text)
 

@@ -217,9 +217,8 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     shape = chamber.pop("shape", "cylinder")
     sizes = ", ".join(f"{in_words(key)} {value:g}" for key, value in _numbers(chamber))
     yield "chamber", f"{shape}: {sizes} mm", tuple(f"chamber.{key}" for key in chamber)
-    blocks = design.sonotrode.blocks
-    face = made.sonotrode.in_words if blocks is None else blocks.in_words
-    yield "sonotrode", face, tuple(f"sonotrode.{key}" for key in tables["sonotrode"])
+    face = design.sonotrode.face or made.sonotrode.face
+    yield "sonotrode", face.in_words, tuple(f"sonotrode.{key}" for key in tables["sonotrode"])
     for table, name in (("holder", "held by"), ("mask", "masked by")):
         own = {key: one for key, one in tables.items() if key.partition(".")[0] == table}
         if own:

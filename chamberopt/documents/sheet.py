@@ -88,17 +88,17 @@ def alarms(result: Result) -> Iterator[str]:
 
 def _wide_face(result: Result, face_mm: tuple[float, ...]) -> Iterator[str]:
     """Yield a sentence if the face is larger than usual, and its amplitude was not measured."""
-    blocks = result.design.sonotrode.blocks
-    widest = max(face_mm if blocks is None else blocks.size_mm)
+    face = result.design.sonotrode.face
+    widest = max(face_mm if face is None else face.block_mm)
     if widest > WIDEST_FACE and result.design.sonotrode.amplitude_profile is None:
         yield (
-            f"The face, {_face(face_mm)}, is larger than usual sonotrodes, and was simulated as "
+            f"The face, {_size(face_mm)}, is larger than usual sonotrodes, and was simulated as "
             "one that moves alike all over. If yours is smaller, set several side by side or peen "
             "a strip at a time; if it has slots, measure its amplitude over the face."
         )
 
 
-def _face(face_mm: tuple[float, ...]) -> str:
+def _size(face_mm: tuple[float, ...]) -> str:
     """Return the size of a sonotrode's face in words: of a disc its diameter alone."""
     return f"{'Ø ' if len(face_mm) == 1 else ''}{' × '.join(map(plain, face_mm))} mm"
 
@@ -382,9 +382,12 @@ def key_row(key: str, value: Any) -> Row:
 
 def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     design = result.design
-    yield "face in the chamber", _face(face_mm)
-    if design.sonotrode.blocks is not None:
-        yield "made of", f"{design.sonotrode.blocks.in_words}, driven alike: simulated as one face"
+    face = design.sonotrode.face
+    if face is not None:
+        alike = ", driven alike: simulated as one face" if face.count > 1 else ""
+        yield "take", f"{face.in_words}{alike}"
+    yield "face in the chamber", _size(face_mm)
+    if face is not None and face.count > 1:
         gap = plain(1e3 * WIDEST_GAP * min(design.ball_diameters), 3)
         yield "gaps between the blocks", f"below {gap} mm, half a ball"
     yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.design.shape_surface import is_sonotrode
+from chamberopt.design.shape_surface import TAG_PART, is_sonotrode
 from chamberopt.pictures.actors import add_chamber
 from chamberopt.pictures.camera import (
     cells_of,
@@ -89,7 +89,7 @@ def chamber_panel(
 
     points = np.concatenate([part.points, chamber.points])
     view = render_view(add_both, eye, points, SIZE, BORDER_OF_CHAMBER)
-    return Panel(view, caption, chamber_dimensions(chamber, eye, float(part.bounds[4])), points)
+    return Panel(view, caption, chamber_dimensions(chamber, eye), points)
 
 
 def without_twin(panels: Sequence[Panel]) -> list[Panel]:
@@ -120,16 +120,18 @@ def near_panels(
     ]
 
 
-def chamber_dimensions(chamber: Surface, eye: np.ndarray, lowest: float) -> list[Dimension]:
+def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:
     """Return the dimensions to write at a chamber.
 
-    They are the chamber's size, and the distance from the sonotrode to the part's lowest point.
+    They are the chamber's size, and the distance from the sonotrode to the lowest point of the part
+    in it.
 
     Args:
-        chamber: surface of the cavity.
+        chamber: surface of the cavity, with the tags of its triangles.
         eye: direction to the eye.
-        lowest: height of the part's lowest point [mm], which may be outside the cavity.
     """
+    on_part = cells_of(chamber, np.asarray(chamber["tag"]) == TAG_PART)
+    lowest = float(on_part.bounds[4])
     frame = view_frame(eye)
     low, high = np.reshape(chamber.bounds, (3, 2)).T
     middle, size = 0.5 * (low + high), high - low

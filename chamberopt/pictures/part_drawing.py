@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from chamberopt.chamber.build import Chamber
-    from chamberopt.design.sonotrode import Blocks
+    from chamberopt.design.sonotrode import Face
 
 # All lengths are in mm on the page.
 
@@ -161,7 +161,7 @@ def draw_chamber(
     top: float,
     size: Point,
     limits: Limits = MappingProxyType({}),
-    blocks: Blocks | None = None,
+    face: Face | None = None,
 ) -> str:
     """Draw sections and plan of a chamber on a page, and return what they are, with their scale.
 
@@ -170,7 +170,8 @@ def draw_chamber(
         left, top: upper left corner of the drawing.
         size: width and height that it may have.
         limits: what the keys of [chamber] may be, for dimensions that show one of them.
-        blocks: of which the floor is made, whose joints the plan shows.
+        face: on which the chamber stands, whose joints the plan shows, and its rim where it is
+            larger than the floor.
     """
     mm = 1e3 * chamber.vertices
     low, high = mm.min(axis=0), mm.max(axis=0)
@@ -194,12 +195,11 @@ def draw_chamber(
     corner = np.array([x + BESIDE, middle - 0.5 * deep + 1.0])
     view = View(0, scale, corner, low[:2], high[:2], np.zeros(2))
     _draw_plan(axes, chamber, view, planes, limits)
-    if blocks is not None:
-        _draw_joints(axes, chamber, view, blocks)
+    dashed = [] if face is None else _draw_face(axes, chamber, view, face)
     text = f"{plain(scale)}:1" if scale >= 1.0 else f"1:{plain(1.0 / scale)}"
     what = "Section A–A" if len(planes) == 1 else "Sections A–A and B–B"
-    joints = "" if blocks is None else ", dashed: the joints of the floor's blocks"
-    return f"{what} and plan, scale {text}{joints}"
+    dashes = f", dashed: {' and '.join(dashed)}" if dashed else ""
+    return f"{what} and plan, scale {text}{dashes}"
 
 
 def _fit(
@@ -284,7 +284,7 @@ def _draw_section(
         low, high = view.place([[view.low[0], 0.0], [view.high[0], 0.0]])[:, 0]
         text = _with_limits(plain(wide), wide, limits, side)
         dimension(axes, (low, y - FACE), (high, y - FACE), 8.5, text)
-    lowest = 1e3 * float(chamber.part.vertices[:, 2].min())
+    lowest = 1e3 * chamber.lowest_of_part
     left, low_at = view.place([view.low[0], lowest]) - np.array([view.outside[0], 0.0])
     right = view.place(view.high)[0] + view.outside[0]
     text = _with_limits(plain(lowest), lowest, limits, "sonotrode_distance_mm")
@@ -360,18 +360,35 @@ def _draw_plan(
     _label(axes, left, top + (6.5 if is_upright else 2.5), "plan: x to the right, y up")
 
 
-def _draw_joints(axes: Axes, chamber: Chamber, view: View, blocks: Blocks) -> None:
-    """Draw the joints between the blocks of which the floor is made, as far as the floor goes."""
-    face = chamber.triangles[chamber.tags == TAG_SONOTRODE]
-    area = inside(1e3 * chamber.vertices[border_edges(face)][:, :, :2])
+def _draw_face(axes: Axes, chamber: Chamber, view: View, face: Face) -> list[str]:
+    """Draw the joints between blocks on the floor, and the rim of a face that goes beyond it.
+
+    Return what was drawn, in words.
+    """
+    from matplotlib.patches import Rectangle
+
+    floor = chamber.triangles[chamber.tags == TAG_SONOTRODE]
+    area = inside(1e3 * chamber.vertices[border_edges(floor)][:, :, :2])
     assert area is not None
-    floor = type(area)(view.place(area.vertices), area.codes)
-    for axis, places in enumerate(blocks.joints_mm):
+    in_view = type(area)(view.place(area.vertices), area.codes)
+    look: dict[str, Any] = {"ls": (0, (6, 2)), "lw": 0.8}
+    for axis, places in enumerate(face.joints_mm):
         for at in places:
             ends = np.array([view.low, view.high])
             ends[:, axis] = at
-            (line,) = axes.plot(*view.place(ends).T, color=SONOTRODE, lw=0.8, ls=(0, (6, 2)))
-            line.set_clip_path(floor, axes.transData)
+            (line,) = axes.plot(*view.place(ends).T, color=SONOTRODE, **look)
+            line.set_clip_path(in_view, axes.transData)
+    found = ["the joints of the floor's blocks"] if face.count > 1 else []
+    if (np.array(face.sides_mm) > np.ptp(area.vertices, axis=0) + WIDER).any():
+        rim = view.place(1e3 * face.outline[[*range(len(face.outline)), 0]])
+        (line,) = axes.plot(*rim.T, color=SONOTRODE, **look)
+        (left, foot), (right, top) = view.place(np.array([view.low, view.high]))
+        size = right - left + 2.0 * BESIDE, top - foot + 2.0 * BESIDE
+        line.set_clip_path(
+            Rectangle((left - BESIDE, foot - BESIDE), *size, transform=axes.transData)
+        )
+        found.append("the sonotrode's rim")
+    return found
 
 
 def _fill(axes: Axes, view: View, lines: np.ndarray, window: Rectangle, **look: Any) -> None:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.font_manager import FontProperties
 
     from chamberopt.chamber.build import Chamber
-    from chamberopt.design.sonotrode import Blocks
+    from chamberopt.design.sonotrode import Face
 
 SHEET = "process_sheet.pdf"
 CREATOR = "chamberopt process sheet"  # marks a sheet, so that a newer sheet may replace it
@@ -244,7 +244,7 @@ def write_sheet(
         chamber = load_chamber(loaded)
         built = AsBuilt(face_size_mm(chamber), find_openings(chamber))
         sheet = process_sheet(loaded, built, revision)
-        pages = draw_sheet(sheet, chamber, chamber_limits(loaded), loaded.design.sonotrode.blocks)
+        pages = draw_sheet(sheet, chamber, chamber_limits(loaded), loaded.design.sonotrode.face)
         _save(path, pages, sheet.name)
     return path, sheet
 
@@ -253,7 +253,7 @@ def draw_sheet(
     sheet: Document,
     chamber: Chamber,
     limits: Limits = MappingProxyType({}),
-    blocks: Blocks | None = None,
+    face: Face | None = None,
 ) -> list[Figure]:
     """Return a process sheet as figures of its pages.
 
@@ -263,7 +263,7 @@ def draw_sheet(
     Args:
         sheet: a document as process_sheet makes it.
         limits: what the keys of [chamber] may be, for the drawing's dimensions.
-        blocks: of which the chamber's floor is made.
+        face: on which the chamber stands, if it is known.
     """
     ignore_settings_here()
     first, further, block = sheet.sections
@@ -282,7 +282,7 @@ def draw_sheet(
         if room >= DRAWING_PER_PT * size:
             break
     tall = min(MOST_DRAWING, room) - CAPTION
-    views = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall), limits, blocks)
+    views = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall), limits, face)
     Writer(axes, 6.0).write(f"{views}, {LEGEND}", MARGIN, top - tall, INNER, colour=DARK_GREY)
     _content(Writer(axes, size, most), shown, top - tall - CAPTION)
     if not alone:

@@ -352,20 +352,20 @@ def _sonotrode_warnings(design: Design, mesh: TriangleMesh, line: Axis | None) -
 def _block_warnings(design: Design, chamber: Chamber) -> list[str]:
     """Return a warning if the floor is so small that fewer of its blocks carry it.
 
-    A design records no size of a floor that is one sonotrode.
+    A floor that is a part of one sonotrode is usual.
     """
-    blocks = design.sonotrode.blocks
-    if blocks is None:
+    blocks = design.sonotrode.face
+    if blocks is None or blocks.count == 1:
         return []
     sides = floor_sides_mm(chamber.vertices, chamber.triangles, chamber.tags)
-    columns, rows = np.ceil(sides / np.array(blocks.size_mm) - 1e-6).astype(int)
+    columns, rows = np.ceil(sides / np.array(blocks.block_mm) - 1e-6).astype(int)
     if columns * rows >= blocks.count:
         return []
     (x, y), (long, wide) = sides, blocks.sides_mm
     return [
         f"the sonotrodes are wider than the floor: {blocks.in_words}, together {long:g} × {wide:g} "
         f"mm, and the floor is {x:.4g} × {y:.4g} mm, so that walls stand over their faces; set "
-        f"sonotrode.blocks.columns = {columns} and sonotrode.blocks.rows = {rows}, or enlarge the "
+        f"sonotrode.face.columns = {columns} and sonotrode.face.rows = {rows}, or enlarge the "
         "chamber"
     ]
 

@@ -5,6 +5,7 @@ Every number comes from a rule of thumb, with its reason beside it. A study then
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -68,6 +69,7 @@ from chamberopt.chamber.propose.proposed_floor import (
     require_room,
 )
 from chamberopt.chamber.propose.proposed_target import (
+    Sizes,
     Surface,
     Target,
     middle_in_plan,
@@ -82,6 +84,7 @@ from chamberopt.common.progress import step
 from chamberopt.common.toml_fields import MAX_COORDINATE_MM
 from chamberopt.design.design import Design, validate
 from chamberopt.design.materials import CATALOGUE, USUAL, alloy, ball, balls
+from chamberopt.geometry.heights import lowest_over
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import BY_SIZE, METRES_PER
@@ -116,6 +119,8 @@ BETWEEN = "a plate that fits between the faces of the part, like the two walls b
 CUT_OUT = "plates, cut out round it"
 OWN_WALL, OWN_LID = "the part itself is the wall", f"the part itself is the lid: {CUT_OUT}"
 START = "NOT MEASURED by a pilot, a start"
+CLEAR, FARTHER = 1e-3, 1.0  # m; and share of the distance, for the next
+OUTSIDE = f"outside of the walls the part stays {1e3 * CLEAR:g} mm above the sonotrode's face"
 ON_END = "on end, as no single sonotrode is large enough for it lying"
 
 
@@ -256,7 +261,6 @@ def _proposed(
     measures = f"the part measures {format_box(mesh.size)}"
     by = "as asked" if wanted.unit in METRES_PER else "by the file"
     reasons = {
-        "sonotrode.blocks": of_blocks(diameter),
         "part.unit": f"UNIT GUESSED: {measures}"
         if is_guessed
         else f"{measures}, unit {mesh.unit}, {by}",
@@ -307,7 +311,7 @@ def _proposed(
                 if turning is not None:
                     words["part.rotate_deg"] = why_so
                     words["effects.part_turn"] = f"TURNED BY A DRIVE, at {RPM:g} rpm"
-                why = {**reasons, **words, **_floor_reasons(floor, goes_out)}
+                why = {**reasons, **words, **_floor_reasons(floor, goes_out, diameter)}
                 made = checked(own, why, floor, known, mesh, wanted.shop)
             except UnreadableError:
                 raise
@@ -517,8 +521,13 @@ def _place(
             floor = floor_on_sonotrode(
                 sizes, _round(posed), shop or usual_shop(), shop is None, ball
             )
+            lowest = 0.0
+            if local is not None:
+                lowest = lowest_over(posed, mesh.triangles, local.plan(floor.sizes))
+                floor = floor._replace(sizes=local.as_low_as(floor.sizes, lowest))
+                floor = _clear_of_face(posed, mesh.triangles, floor, local.middle, lowest)
             if shop is not None:
-                room, highest = require_room(floor.sizes, shop), float(posed[:, 2].max())
+                room, highest = require_room(floor.sizes, shop), float(posed[:, 2].max()) - lowest
                 if highest < room.height - room.distance:  # a higher lid takes in the whole part
                     room = replace(room, through_ceiling=False, top=highest)
                 floor = floor._replace(sizes=room)
@@ -533,6 +542,31 @@ def _place(
     if refused and not found:
         raise refused
     return min(found, key=lambda one: one[1].excess)
+
+
+def _clear_of_face(
+    posed: np.ndarray,
+    triangles: np.ndarray,
+    floor: Floor,
+    middle: Callable[[Sizes], np.ndarray],
+    lowest: float,
+) -> Floor:
+    """Return a floor so far below a part that its face does not hit what is outside of the walls.
+
+    Args:
+        posed, triangles: the part in its pose, (n, 3) [m] and (m, 3).
+        middle: the middle of the chamber in plan in the pose (2,) [m], for its sizes.
+        lowest: height of the part's lowest point within the walls, in the pose [m].
+    """
+    face, sizes = floor.face, floor.sizes
+    if face is None:
+        return floor
+    over = lowest_over(posed, triangles, face.outline + middle(sizes))
+    lacks = 1e-3 * math.ceil(1e3 * (lowest - sizes.distance + CLEAR - over) - 1e-6)
+    if not 0.0 < lacks <= FARTHER * sizes.distance:  # a distance too large is refused when built
+        return floor
+    sizes = replace(sizes, distance=sizes.distance + lacks, height=sizes.height + lacks)
+    return floor._replace(sizes=sizes, above_face=CLEAR)
 
 
 def _hanging(
@@ -564,11 +598,11 @@ def _round(posed: np.ndarray) -> float:
 
 def _floor_tables(floor: Floor) -> Tables:
     """Return the tables of the design file that follow from the floor: chamber and sonotrode."""
-    sizes, one = floor.sizes, floor.face.sonotrode
+    sizes, one = floor.sizes, floor.stand.sonotrode
     key, amplitude = one.amplitude_nearest(AMPLITUDE_UM)
     sonotrode: dict[str, Any] = {"frequency_khz": one.frequency_khz, key: amplitude}
-    if floor.blocks is not None:
-        sonotrode["blocks"] = floor.blocks.model_dump(mode="json")
+    if floor.face is not None:
+        sonotrode["face"] = floor.face.model_dump(mode="json", exclude_defaults=True)
     return {
         "chamber": {
             "shape": sizes.shape,
@@ -580,8 +614,8 @@ def _floor_tables(floor: Floor) -> Tables:
     }
 
 
-def _floor_reasons(floor: Floor, goes_out: bool) -> dict[str, str]:
-    sizes, one = floor.sizes, floor.face.sonotrode
+def _floor_reasons(floor: Floor, goes_out: bool, ball: float) -> dict[str, str]:
+    sizes, one = floor.sizes, floor.stand.sonotrode
     where = "; the part goes out through it" if sizes.through_ceiling else ""
     where = f"; {BETWEEN}" if sizes.is_fixed else where
     where += "; " + OWN_LID if "z" in sizes.closed else ""
@@ -593,8 +627,10 @@ def _floor_reasons(floor: Floor, goes_out: bool) -> dict[str, str]:
     kind += " peak-to-valley" if key == "amplitude_um" else ""
     return {
         "chamber.height_mm": f"sonotrode to ceiling{where}",
-        "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point",
+        "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point in it"
+        + (f", so far that {OUTSIDE}" if floor.above_face else ""),
         **({"sonotrode.frequency_khz": one.note} if one.note else {}),
+        **({"sonotrode.face": of_blocks(ball)} if floor.stand.face.count > 1 else {}),
         **({"part.offset_mm": placed} if any(floor.offset_mm) else {}),
         f"sonotrode.{key}": f"{kind}; one to which the sonotrode can be set",
     }

@@ -121,8 +121,8 @@ class Proposal:
     @property
     def sonotrode_count(self) -> int:
         """How many sonotrodes side by side carry the chamber."""
-        blocks = self.design.sonotrode.blocks
-        return 1 if blocks is None else blocks.count
+        face = self.design.sonotrode.face
+        return 1 if face is None else face.count
 
 
 def checked(
@@ -173,7 +173,7 @@ def checked(
         chamber=chamber,
         warnings=found,
         jams=tuple(jam_gaps(chamber, diameter, gaps_in_reach(shot_reach(design, chamber)))),
-        sonotrode=floor.face.sonotrode,
+        sonotrode=floor.stand.sonotrode,
     )
 
 

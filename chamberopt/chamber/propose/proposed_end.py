@@ -26,6 +26,7 @@ import numpy as np
 from chamberopt.chamber.propose.pose import Turns, turns_down
 from chamberopt.chamber.propose.proposed_target import Sizes, Target
 from chamberopt.design.shapes.outlines import area_inside
+from chamberopt.geometry.heights import lowest_over
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import convex_hull
 from chamberopt.geometry.triangles import (
@@ -51,8 +52,8 @@ CLAMPED, LONG_ENOUGH, INSIDE, ROOT = 0.75, 10e-3, 6e-3, 0.5
 # Of a face that closes a chamber: cosine, share of the rectangle round the target, and how far it
 # may lie before the target's end [m]. The wall is that far behind it [m].
 FACING, CLOSES, BEFORE, BEHIND = 0.999, 0.5, 1e-5, 0.2e-3
-# What of the part stands outside such walls may come nearer to the sonotrode: share of the distance
-# that is left. It may stand into the chamber by [m].
+# What stands into the chamber by no more than INTO [m], such as the rim of such a face, may come
+# nearer to the sonotrode: share of the distance that is left.
 NEAREST, INTO = 0.25, 0.5e-3
 
 
@@ -216,6 +217,18 @@ class LocalRoom(NamedTuple):
     sizes: Sizes
     walls: np.ndarray  # places of its walls along -x and -y, and along x and y, in the pose [m]
     kept: np.ndarray  # marks those that stay there if the box becomes longer or shorter, (2, 2)
+    lowest: float  # height of the part's lowest point within the walls, in the pose [m]
+
+    def as_low_as(self, sizes: Sizes, lowest: float) -> Sizes:
+        """Return sizes for walls within which the part's lowest point is another one [m]."""
+        more = self.lowest - lowest
+        height = 1e-3 * math.ceil(1e3 * (sizes.height + more) - 1e-6)
+        return replace(sizes, height=height, top=sizes.top + more) if more else sizes
+
+    def plan(self, sizes: Sizes) -> np.ndarray:
+        """Return the corners (4, 2) [m] of the box in the pose if it gets other sizes."""
+        half = 5e-4 * np.array([sizes.plan["length_mm"], sizes.plan["width_mm"]], dtype=float)
+        return _rectangle(self.middle(sizes) + half * np.array([[-1.0], [1.0]]))
 
     def middle(self, sizes: Sizes) -> np.ndarray:
         """Return the middle in plan (2,) [m] of the box if it gets other sizes."""
@@ -254,23 +267,33 @@ def local_room(
     for k, key in enumerate(("length_mm", "width_mm")):
         if kept[:, k].any():
             plan[key] = _up_half_mm(walls[1, k] - walls[0, k])
-    corners = posed[triangles]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    inside = ((high[:, :2] > walls[0] + INTO) & (low[:, :2] < walls[1] - INTO)).all(axis=1)
-    lower = min(float(low[inside, 2].min()), (1.0 - NEAREST) * sizes.distance)
+    lowest, inner = (
+        lowest_over(posed, triangles, _rectangle(walls + into * np.array([[1.0], [-1.0]])))
+        for into in (0.0, INTO)
+    )
+    if not math.isfinite(inner):
+        lowest = inner = 0.0  # refused when it is built
+    distance = max(sizes.distance - (inner - lowest), NEAREST * sizes.distance)
     names = np.array([["-x", "-y", "-z"], ["x", "y", "z"]])
     sizes = replace(
         sizes,
         plan=plan,
         closed=tuple(map(str, names[closes])),
-        distance=1e-3 * math.ceil(1e3 * (sizes.distance - lower) - 1e-6),
-        height=1e-3 * math.ceil(1e3 * (sizes.height - lower) - 1e-6),
+        distance=1e-3 * math.ceil(1e3 * distance - 1e-6),
+        height=1e-3 * math.ceil(1e3 * (sizes.height - sizes.distance + distance - lowest) - 1e-6),
+        top=sizes.top - lowest,
     )
     if closes[1, 2]:
-        height = 1e-3 * _up_half_mm(sizes.distance + faces[1, 2])
-        top = float(faces[1, 2] - BEHIND)
+        height = 1e-3 * _up_half_mm(sizes.distance + faces[1, 2] - lowest)
+        top = float(faces[1, 2] - lowest - BEHIND)
         sizes = replace(sizes, height=height, through_ceiling=True, top=top)
-    return LocalRoom(sizes, walls, kept)
+    return LocalRoom(sizes, walls, kept, lowest)
+
+
+def _rectangle(walls: np.ndarray) -> np.ndarray:
+    """Return the corners (4, 2) of the rectangle between walls (2, 2), counter-clockwise."""
+    (left, front), (right, back) = walls
+    return np.array([[left, front], [right, front], [right, back], [left, back]])
 
 
 def _up_half_mm(length: float) -> float:

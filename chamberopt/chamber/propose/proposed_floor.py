@@ -24,11 +24,11 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.chamber.propose.proposed_target import Sizes
-from chamberopt.chamber.propose.shop import Face, Shop
+from chamberopt.chamber.propose.shop import Shop, Stand
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.design.fixture import WIDEST_GAP
-from chamberopt.design.sonotrode import Blocks
+from chamberopt.design.sonotrode import Face
 
 TIGHTER = 0.6  # share of the room beside the part that is left, so that the walls stand upright
 STEEPEST = 30.0  # degrees: walls that lean more throw the balls up rather than inwards
@@ -53,27 +53,27 @@ class Floor(NamedTuple):
     """The sizes of a chamber on a sonotrode of a shop."""
 
     sizes: Sizes
-    face: Face
+    stand: Stand
     reason: str  # for the chamber's size in plan
     lean: float = 0.0  # of the walls [degrees]; infinite if no sonotrode is large enough
     too_large: float = 0.0  # area of a floor for which no sonotrode is large enough [m²]
     offset_mm: tuple[float, float] = (0.0, 0.0)  # of the part, so that its target is on the axis
+    above_face: float = 0.0  # how far the part outside of the walls stays above the face [m]
 
     @property
     def is_one_sonotrode(self) -> bool:
         """Whether one sonotrode carries the chamber."""
-        return math.isfinite(self.lean) and self.face.blocks is None
+        return math.isfinite(self.lean) and self.stand.face.count == 1
 
     @property
-    def blocks(self) -> Blocks | None:
-        """Blocks of which the floor is made, as they lie in the chamber; None for one sonotrode."""
-        return self.face.laid(_is_turned(self.sizes)).blocks
+    def face(self) -> Face | None:
+        """The face as it lies under the chamber; None if none is large enough."""
+        return _laid(self.sizes, self.stand) if math.isfinite(self.lean) else None
 
     @property
     def excess(self) -> tuple[float, ...]:
         """How far the floor is from one upright over one sonotrode; less is better."""
-        count = 1 if self.face.blocks is None else self.face.blocks.count
-        return math.isinf(self.lean), count, self.lean, self.too_large
+        return math.isinf(self.lean), self.stand.face.count, self.lean, self.too_large
 
 
 def floor_on_sonotrode(
@@ -93,14 +93,14 @@ def floor_on_sonotrode(
         InputError: the shop has no sonotrode for it.
     """
     sizes = _as_wide_as_high(sizes, shop)
-    moves = [(_move(sizes, round_part, one), one) for one in map(Face, shop.sonotrodes)]
+    moves = [(_move(sizes, round_part, one), one) for one in shop.stands()]
     if held := [one for move, one in moves if move <= HELD]:
-        return _over_the_face(sizes, shop, min(held, key=lambda one: one.area_mm2))
-    move, face = min(moves, key=lambda one: one[0])
+        return _over_the_face(sizes, shop, min(held, key=lambda one: one.face.area_mm2))
+    move, stand = min(moves, key=lambda one: one[0])
     is_given = sizes.shape == "conformal" or sizes.is_fixed
     tighter = 0.0 if is_given else (1.0 - TIGHTER) * sizes.gap
     if move <= tighter:
-        return _over_the_face(_tight(sizes, move, face), shop, face)
+        return _over_the_face(_tight(sizes, move, stand), shop, stand)
     far = min(
         max(sizes.distance, move / math.tan(math.radians(STEEPEST))), FARTHER * sizes.distance
     )
@@ -109,24 +109,25 @@ def floor_on_sonotrode(
     rise = (sizes.height + far - sizes.distance) * move / far
     if not is_given and angle <= STEEPEST + 0.5 and rise <= WIDEST:
         height = sizes.height + far - sizes.distance
-        return _leaning(replace(sizes, distance=far, height=height), move, angle, face)
-    floors = [(one.area_mm2, _move(sizes, round_part, one), one) for one in shop.floors_of_blocks()]
+        return _leaning(replace(sizes, distance=far, height=height), move, angle, stand)
+    blocks = list(shop.stands_of_blocks())
+    floors = [(one.face.area_mm2, _move(sizes, round_part, one), one) for one in blocks]
     closer = 0.0 if is_given else sizes.gap - LEAST_ROOM * ball
     if near := [one for one in floors if one[1] <= max(tighter, closer, HELD)]:
-        _, out, face = min(near, key=lambda one: one[0])
-        return _over_the_face(_tight(sizes, out, face) if out > HELD else sizes, shop, face)
+        _, out, stand = min(near, key=lambda one: one[0])
+        return _over_the_face(_tight(sizes, out, stand) if out > HELD else sizes, shop, stand)
     sides = _sides(sizes, round_part)
     wanted = " x ".join(f"{1e3 * one:.4g}" for one in sides)
     ways = (
         "peen it a strip at a time, each in a chamber of its own (cut the part down to it), "
         "set several sonotrodes side by side ([[sonotrodes]] pieces), or take a larger one"
     )
-    text = f"the floor of {wanted} mm is larger than the largest face, {face.in_words}"
+    text = f"the floor of {wanted} mm is larger than the largest face, {stand.face.in_words}"
     if not may_exceed:
         raise InputError(f"--shop: {text}, also with walls that lean by {STEEPEST:g}°: {ways}")
     usual = "usual ones: chamberopt shop --example; give yours by --shop"
     reason = f"LARGER THAN USUAL SONOTRODES, simulated as one face: {ways}; {usual}"
-    return Floor(sizes, face, reason, math.inf, math.prod(sides))
+    return Floor(sizes, stand, reason, math.inf, math.prod(sides))
 
 
 def _as_wide_as_high(sizes: Sizes, shop: Shop) -> Sizes:
@@ -134,7 +135,7 @@ def _as_wide_as_high(sizes: Sizes, shop: Shop) -> Sizes:
     if sizes.shape != "cylinder":
         return sizes
     wanted = float(sizes.plan["diameter_mm"])
-    carried = max(one.sides_mm[1] for one in shop.sonotrodes)
+    carried = max(one.face.sides_mm[1] for one in shop.sonotrodes)
     most = min(carried, *(shop.largest_chamber_mm or (carried,))[:2])
     wider = max(wanted, min(math.floor(1e3 * sizes.height), most))
     return replace(sizes, plan={"diameter_mm": wider}, gap=sizes.gap + 5e-4 * (wider - wanted))
@@ -162,62 +163,63 @@ def _sides(sizes: Sizes, round_part: float) -> tuple[float, float]:
     return (2.0 * _radius(sizes, round_part),) * 2
 
 
-def _move(sizes: Sizes, round_part: float, face: Face) -> float:
+def _move(sizes: Sizes, round_part: float, stand: Stand) -> float:
     """Return how far the walls of the wanted floor must move in to stand on a face [m].
 
     It is at most 0 if the floor lies within the face, and infinite if no floor of this form does.
     A box whose walls move in by t has the half diagonal r at x + y - 2 t = sqrt(2 r² - (x - y)²).
     """
-    width = 5e-4 * face.sides_mm[1]
+    width = 5e-4 * stand.face.sides_mm[1]
     if sizes.shape != "box":
         radius = _radius(sizes, round_part)
         inner = math.cos(math.pi / int(sizes.plan["sides"])) if sizes.shape == "prism" else 1.0
         return inner * (radius - width)
     x, y = _half(sizes)
-    if face.sonotrode.size_mm is not None:
-        along_x, along_y = (5e-4 * one for one in _along(sizes, face))
+    if stand.face.size_mm is not None:
+        along_x, along_y = (5e-4 * one for one in _laid(sizes, stand).sides_mm)
         return max(x - along_x, y - along_y)
     square = 2.0 * width**2 - (x - y) ** 2
     move = 0.5 * (x + y - math.sqrt(square)) if square > 0.0 else math.inf
     return move if move < 0.8 * min(x, y) else math.inf
 
 
-def _moved(sizes: Sizes, move: float, face: Face) -> dict[str, float | str]:
+def _moved(sizes: Sizes, move: float, stand: Stand) -> dict[str, float | str]:
     """Return the keys of the floor with its walls moved in by some length [m] onto a face."""
     if sizes.shape == "cylinder":
-        return {**sizes.plan, "diameter_mm": face.sides_mm[1]}
+        return {**sizes.plan, "diameter_mm": stand.face.sides_mm[1]}
     plan = {key: one for key, one in sizes.plan.items() if key.endswith("_mm")}
     inside = {key: math.floor(10.0 * float(one) - 2e4 * move) / 10.0 for key, one in plan.items()}
     return {**sizes.plan, **inside}
 
 
-def _tight(sizes: Sizes, move: float, face: Face) -> Sizes:
+def _tight(sizes: Sizes, move: float, stand: Stand) -> Sizes:
     """Return sizes with less room beside the part, so that the floor lies within a face."""
-    plan = _moved(sizes, move, face)
-    if sizes.shape == "box" and face.sonotrode.size_mm is not None:  # only where it is too wide
-        sides = zip(plan, _along(sizes, face), strict=True)
+    plan = _moved(sizes, move, stand)
+    if sizes.shape == "box" and stand.face.size_mm is not None:  # only where it is too wide
+        sides = zip(plan, _laid(sizes, stand).sides_mm, strict=True)
         plan = {key: min(float(sizes.plan[key]), side) for key, side in sides}
     return replace(sizes, plan=plan, gap=sizes.gap - move)
 
 
-def _over_the_face(sizes: Sizes, shop: Shop, face: Face) -> Floor:
+def _over_the_face(sizes: Sizes, shop: Shop, stand: Stand) -> Floor:
     """Return a floor that is the whole face, if the face is little larger, else a part of it.
 
     A wall that goes round the face stands beside it by the clearance, which is not simulated.
     """
-    clear, name = f"{shop.clearance_mm:g} mm clear", face.laid(_is_turned(sizes)).in_words
+    clear, face = f"{shop.clearance_mm:g} mm clear", _laid(sizes, stand)
+    name = _named(face)
 
     def room(sides: Iterable[float]) -> str:
         """Return in words how wide the room must be where its wall goes round the face."""
         wide = " x ".join(f"{one + 2.0 * shop.clearance_mm:g}" for one in sides)
-        gaps = "" if face.blocks is None else " and the gaps between the blocks"
+        gaps = "" if face.count == 1 else " and the gaps between the blocks"
         return f"BUILD IT {wide} mm wide, as the slit round {name}{gaps} is not simulated"
 
-    plan = dict(zip(("length_mm", "width_mm"), _along(sizes, face), strict=True))
+    plan = dict(zip(("length_mm", "width_mm"), face.sides_mm, strict=True))
     if sizes.shape == "cylinder":
         plan = {"diameter_mm": face.sides_mm[0]}
-    is_disc = face.sonotrode.size_mm is None
-    most = WHOLE if face.blocks is None else WHOLE_OF_BLOCKS
+    is_disc = face.size_mm is None
+    most = WHOLE if face.count == 1 else WHOLE_OF_BLOCKS
     alike = (sizes.shape, is_disc) in (("cylinder", True), ("box", False))
     if (
         alike
@@ -227,35 +229,36 @@ def _over_the_face(sizes: Sizes, shop: Shop, face: Face) -> Floor:
         more = min(plan[key] - float(sizes.plan[key]) for key in plan)
         wider = replace(sizes, plan={**sizes.plan, **plan}, gap=sizes.gap + 5e-4 * more)
         text = f"the face of {name}, the wall round it {clear}; {room(plan.values())}"
-        return Floor(wider, face, text)
+        return Floor(wider, stand, text)
     where = f"ends over its face, {clear}"
     if sides := [one for key, one in plan.items() if float(sizes.plan.get(key, 0.0)) >= one]:
         where = (
             f"goes round it on two sides, {clear}, and ends over its face elsewhere; {room(sides)}"
         )
-    return Floor(sizes, face, f"on {name}: the wall {where}")
+    return Floor(sizes, stand, f"on {name}: the wall {where}")
 
 
-def _along(sizes: Sizes, face: Face) -> tuple[float, float]:
-    """Return the sides [mm] of a face as it lies under a floor, along x and y."""
-    long, wide = face.sides_mm
-    return (wide, long) if _is_turned(sizes) else (long, wide)
+def _laid(sizes: Sizes, stand: Stand) -> Face:
+    """Return a face as it lies under a floor, the longer sides of both along one axis."""
+    plan = sizes.plan
+    is_turned = sizes.shape == "box" and float(plan["length_mm"]) < float(plan["width_mm"])
+    return stand.face.turned if is_turned else stand.face
 
 
-def _is_turned(sizes: Sizes) -> bool:
-    """Return whether the longer side of a face must lie along y."""
-    return sizes.shape == "box" and float(sizes.plan["length_mm"]) < float(sizes.plan["width_mm"])
+def _named(face: Face) -> str:
+    """Return the name of a face in a sentence."""
+    return f"sonotrode {face.in_words}" if face.count == 1 else face.in_words
 
 
-def _leaning(sizes: Sizes, move: float, angle: float, face: Face) -> Floor:
+def _leaning(sizes: Sizes, move: float, angle: float, stand: Stand) -> Floor:
     """Return a floor that is smaller than the room, with walls that lean out from it."""
     lean = float(math.ceil(angle))
-    plan = {**_moved(sizes, move, face), "inclination_deg": lean}
+    plan = {**_moved(sizes, move, stand), "inclination_deg": lean}
     reason = (
-        f"the floor is {face.in_words}; its walls lean out by {lean:g}°, to be wide "
+        f"the floor is {_named(stand.face)}; its walls lean out by {lean:g}°, to be wide "
         "enough where the part is"
     )
-    return Floor(replace(sizes, plan=plan), face, reason, lean)
+    return Floor(replace(sizes, plan=plan), stand, reason, lean)
 
 
 def require_room(sizes: Sizes, shop: Shop) -> Sizes:

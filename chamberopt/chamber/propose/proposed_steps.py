@@ -307,8 +307,8 @@ def _one_after_the_other(coarse: Proposal, finer: Proposal, budgets: Sequence[Bu
         why["shot.diameter_mm"] = "chosen for the intensity"
     if "part.target.reachable" in two.reasons:
         why["part.target.reachable"] = "leaves out what balls of neither size touch here"
-    if two.design.sonotrode.blocks is not None:
-        why["sonotrode.blocks"] = of_blocks(finer.design.shot.diameter)
+    if two.sonotrode_count > 1:
+        why["sonotrode.face"] = of_blocks(finer.design.shot.diameter)
     two = replace(two, reasons={**two.reasons, **why})
     return with_budget(two, in_turn(budgets))
 

@@ -6,7 +6,6 @@ file, `usual_shop` stands in: usual sizes, with their sources in usual_shop.toml
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
@@ -20,7 +19,7 @@ from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import Pair, Several, Triple, list_field, quantity, read_toml
 from chamberopt.design.design import validate
 from chamberopt.design.materials import ball, ball_sizes, balls, find
-from chamberopt.design.sonotrode import MAX_BLOCKS, Blocks
+from chamberopt.design.sonotrode import MAX_BLOCKS, Face
 from chamberopt.design.table_base import FileTable
 
 EXAMPLE = Path(__file__).with_name("usual_shop.toml")
@@ -77,50 +76,17 @@ class ShopSonotrode(FileTable):
         return "amplitude_pv_um", near
 
     @property
-    def sides_mm(self) -> tuple[float, float]:
-        """Length and width of the face; of a disc twice its diameter."""
-        if self.size_mm is None:
-            assert self.diameter_mm is not None
-            return self.diameter_mm, self.diameter_mm
-        return max(self.size_mm), min(self.size_mm)
-
-    @property
-    def in_words(self) -> str:
-        """Name and size, such as "disc A" (70 mm)."""
-        size = " x ".join(f"{one:g}" for one in dict.fromkeys(self.sides_mm))
-        return f'"{self.name}" ({size} mm)'
+    def face(self) -> Face:
+        """Its face, the longer side of a block along x."""
+        size = None if self.size_mm is None else (max(self.size_mm), min(self.size_mm))
+        return Face(name=self.name, diameter_mm=self.diameter_mm, size_mm=size, columns=1, rows=1)
 
 
-class Face(NamedTuple):
-    """A face of a shop on which a chamber can stand: one sonotrode, or blocks side by side."""
+class Stand(NamedTuple):
+    """What a chamber stands on: the face of a sonotrode, or of several side by side."""
 
     sonotrode: ShopSonotrode
-    blocks: Blocks | None = None  # the longer side along x
-
-    @property
-    def sides_mm(self) -> tuple[float, float]:
-        """Length and width of the face; of a disc twice its diameter."""
-        return self.sonotrode.sides_mm if self.blocks is None else self.blocks.sides_mm
-
-    @property
-    def area_mm2(self) -> float:
-        """Length times width of the face."""
-        return math.prod(self.sides_mm)
-
-    @property
-    def in_words(self) -> str:
-        """Name and size."""
-        if self.blocks is None:
-            return f"sonotrode {self.sonotrode.in_words}"
-        return f"{self.blocks.in_words} ({self.sonotrode.name})"
-
-    def laid(self, is_turned: bool) -> Face:
-        """Return the face as its blocks lie in a chamber: columns along x, or along y if turned."""
-        if self.blocks is None or not is_turned:
-            return self
-        x, y = self.blocks.size_mm
-        turned = Blocks(size_mm=(y, x), columns=self.blocks.rows, rows=self.blocks.columns)
-        return self._replace(blocks=turned)
+    face: Face  # the longer side along x
 
 
 class StockBalls(FileTable):
@@ -161,15 +127,19 @@ class Shop(FileTable):
             text = f"given {list(self.heights_mm)}; allowed: 2 to 2000 mm each"
             yield Problem("heights_mm", text)
 
-    def floors_of_blocks(self) -> Iterator[Face]:
-        """Yield the faces that the shop's blocks make side by side, no wider than long."""
+    def stands(self) -> list[Stand]:
+        """Return the sonotrodes, each of which can carry a chamber alone."""
+        return [Stand(one, one.face) for one in self.sonotrodes]
+
+    def stands_of_blocks(self) -> Iterator[Stand]:
+        """Yield the floors that the shop's blocks make side by side, no wider than long."""
         for one in self.sonotrodes:
             for columns, rows in product(range(1, one.pieces + 1), repeat=2):
                 if 1 < columns * rows <= one.pieces:
-                    for size in {one.sides_mm, one.sides_mm[::-1]}:
-                        blocks = Blocks(size_mm=size, columns=columns, rows=rows)
-                        if blocks.sides_mm[0] >= blocks.sides_mm[1]:
-                            yield Face(one, blocks)
+                    for block in {one.face, one.face.turned}:
+                        face = block.model_copy(update={"columns": columns, "rows": rows})
+                        if face.sides_mm[0] >= face.sides_mm[1]:
+                            yield Stand(one, face)
 
     def has(self, material: str) -> bool:
         """Return whether the shop has balls of a material."""

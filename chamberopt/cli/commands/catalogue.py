@@ -88,7 +88,7 @@ def shop(file: Path | None = None, /, *, example: bool = False) -> None:
         show([example_text().rstrip("\n")])
         return
     found = load_shop(file)
-    show([f"{one.in_words}, {one.frequency_khz:g} kHz" for one in found.sonotrodes])
+    show([f"{one.face.in_words}, {one.frequency_khz:g} kHz" for one in found.sonotrodes])
     stock = [
         f"{one.material}: {', '.join(f'{d:g}' for d in one.diameters_mm)} mm" for one in found.balls
     ]

@@ -42,7 +42,7 @@ class ChamberTable(FileTable):
 
     shape: str = Field(description="form of the cavity")
     sonotrode_distance_mm: float = quantity(
-        0.1, 2000, "mm", "mean sonotrode face to lowest point of the part"
+        0.1, 2000, "mm", "mean sonotrode face to lowest point of the part within the walls"
     )
     deflectors: Several[Deflector] = list_field(
         "a list of tables, [[chamber.deflectors]]", "bodies that stand in the chamber", ()
@@ -57,7 +57,9 @@ class ChamberTable(FileTable):
         """Make the path of a user's own shape absolute, like the path of the part's mesh."""
         return str(from_file(shape, info.context)) if is_custom(shape) else shape
 
-    sonotrode_distance = SI("sonotrode_distance_mm", 1e-3, "Sonotrode to lowest point of part [m]")
+    sonotrode_distance = SI(
+        "sonotrode_distance_mm", 1e-3, "Sonotrode to lowest point of the part within the walls [m]"
+    )
 
     @abstractmethod
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
@@ -69,6 +71,14 @@ class ChamberTable(FileTable):
             vertices, triangles: surface of the part in the chamber, (n, 3) [m] and (m, 3), for
                 shapes that follow the part.
         """
+
+    def plan(self) -> np.ndarray | None:
+        """Return the convex outline of the cavity from above, where it is known without the part.
+
+        Its corners (n, 2) [m] are counter-clockwise. Return None for a cavity that follows the
+        part, which all of the part below the ceiling is in, or that a file draws.
+        """
+        return None
 
     def setup(self) -> Setup | None:
         """Return the CAD set-up if chamber and part are drawn in one file; otherwise None."""
@@ -152,6 +162,10 @@ class PolygonChamber(ParametricChamber):
 
         The polygon is convex and its corners are counter-clockwise.
         """
+
+    def plan(self) -> np.ndarray:
+        """Return the larger one of the polygons at floor and ceiling, (n, 2) [m], without radii."""
+        return outlines.move_sides(self.floor(), max(0.0, self.lean))
 
     @property
     def radius(self) -> float:
@@ -240,6 +254,11 @@ class RoundChamber(WalledChamber):
             text = f"given {self.corner_radius_mm:g}, with which the profile crosses itself"
             raise CrossCheckError([Problem("corner_radius_mm", f"{text}; lower it")])
         return self
+
+    def plan(self) -> np.ndarray:
+        """Return the corners (n, 2) [m] of the wall's flat sides where they are farthest out."""
+        angle = 2.0 * np.pi * np.arange(self.facets) / self.facets
+        return np.asarray(self.profile()[:, 0].max() * np.c_[np.cos(angle), np.sin(angle)])
 
     def surface(self, vertices: np.ndarray, triangles: np.ndarray) -> ShapeSurface:
         """Return the cavity's surface: 2 * facets triangles for each profile point but the last."""

@@ -161,6 +161,44 @@ def test_faces_that_coincide_with_the_gear_stay_sound(diameter: float, height: f
     check(design, build_chamber(design))
 
 
+def bridge() -> trimesh.Trimesh:
+    """A bar across the chamber, whose legs hang down outside of the walls (numbers in mm)."""
+    bar = trimesh.creation.box(bounds=[(-60, -5, 0), (60, 5, 8)])
+    legs = [trimesh.creation.box(bounds=[(x - 4, -5, -90), (x + 4, 5, 4)]) for x in (-56.0, 56.0)]
+    return trimesh.boolean.union([bar, *legs], engine="manifold")
+
+
+@pytest.mark.parametrize("turn", [0.0, 90.0, 217.0])
+@pytest.mark.parametrize("aside", [(0.0, 0.0), (3.0, -2.0)])
+@pytest.mark.parametrize("lean", [0.0, 5.0])
+def test_legs_outside_of_the_walls_do_not_set_the_distance(
+    tmp_path: Path, turn: float, aside: tuple[float, float], lean: float
+) -> None:
+    """The cavity is that of the bar alone."""
+    chamber = {"diameter_mm": 70.0, "height_mm": 40.0, "inclination_deg": lean}
+    part = {"rotate_deg": [0.0, 0.0, turn], "offset_mm": aside}
+    whole = with_mesh(tmp_path, bridge(), chamber=chamber, part=part)
+    (tmp_path / "bar").mkdir()
+    bar = trimesh.creation.box(bounds=[(-60, -5, 0), (60, 5, 8)])
+    alone = with_mesh(tmp_path / "bar", bar, chamber=chamber, part=part)
+    made, expected = build_chamber(whole), build_chamber(alone)
+    assert made.volume == pytest.approx(expected.volume, rel=1e-6)
+    assert made.lowest_of_part == pytest.approx(whole.chamber.sonotrode_distance, abs=1e-8)
+    below = 90.0 - whole.chamber.sonotrode_distance_mm
+    assert any(f"reaches {below:.3g} mm below the sonotrode" in note for note in made.notes)
+    assert not any("below the sonotrode" in note for note in expected.notes)
+
+
+def test_a_leg_over_a_face_larger_than_the_floor_is_refused(tmp_path: Path) -> None:
+    chamber = {"diameter_mm": 70.0, "height_mm": 40.0}
+    design = with_mesh(tmp_path, bridge(), chamber=chamber)
+    made = build_chamber(design.changed({"sonotrode.face": {"diameter_mm": 100.0}}))
+    assert made.lowest_of_part == pytest.approx(design.chamber.sonotrode_distance, abs=1e-8)
+    for face in ({"diameter_mm": 110.0, "name": "B"}, {"size_mm": [120.0, 80.0], "name": "B"}):
+        with pytest.raises(InputError, match=r'face: "B" .* reaches down to -7\d mm over it'):
+            build_chamber(design.changed({"sonotrode.face": face}))
+
+
 def test_a_hanging_box_is_subtracted_whole(tmp_path: Path) -> None:
     design = with_mesh(tmp_path, box((10, 20, 25)))
 

@@ -266,7 +266,7 @@ def test_a_small_target_of_a_large_part_gets_a_chamber_of_its_own(tmp_path: Path
     whole.export(tmp_path / "plate.stl")
     made = propose(tmp_path / "plate.stl", Wanted(unit="m"), _lowest)
     part, chamber = made.design.part, made.chamber
-    assert made.design.sonotrode.blocks is None
+    assert made.sonotrode_count == 1
     assert part.offset_mm == (-50.0, 0.0)
     assert np.ptp(chamber.vertices[:, :2], axis=0).max() < 0.08
     target = chamber.part.vertices[chamber.part.triangles[chamber.part.target]]
@@ -274,6 +274,43 @@ def test_a_small_target_of_a_large_part_gets_a_chamber_of_its_own(tmp_path: Path
     assert chamber.pieces_in_air == 0
     assert made.tables["holder"]["kind"] == "bore"  # its own ends, outside the walls
     assert not [text for text in made.warnings if "side wall" in text]
+
+
+@pytest.mark.parametrize(("near", "farther"), [(0.095, 0.0), (0.04, 0.03)])
+def test_legs_outside_of_the_walls_hang_beside_the_sonotrode_or_stay_above_it(
+    tmp_path: Path, near: float, farther: float
+) -> None:
+    """Legs hang below the pad that is peened. Over the face they stay a millimetre above it, which
+    takes a larger distance."""
+    plate = trimesh.creation.box((0.2, 0.06, 0.01))
+    pad = trimesh.creation.box((0.02, 0.06, 0.006))
+    pad.apply_translation((0.0, 0.0, -0.008))
+    solid = [plate, pad]
+    for x in (-near, near):
+        leg = trimesh.creation.box((0.01, 0.06, 0.03 if farther else 0.09))
+        leg.apply_translation((x, 0.0, -0.5 * np.ptp(leg.vertices[:, 2])))
+        solid.append(leg)
+    whole = trimesh.boolean.union(solid, engine="manifold")
+    whole.export(tmp_path / "table.stl")
+    bare = trimesh.boolean.union(solid[:2], engine="manifold")
+    bare.export(tmp_path / "bare.stl")
+
+    def pad_of(known: Sequence[Surface]) -> list[str]:
+        return [min(known, key=lambda one: abs(one.keys["faces"][0]["at_mm"][2] + 11.0)).name]
+
+    found, alone = (
+        propose(tmp_path / f"{name}.stl", Wanted(unit="m"), pad_of)
+        for name in ("table", "bare")
+    )
+    distances = [one.design.chamber.sonotrode_distance for one in (found, alone)]
+    assert all(one.sonotrode_count == 1 for one in (found, alone))
+    lowest = found.chamber.part.vertices[:, 2].min()
+    if farther:
+        assert lowest == pytest.approx(1e-3, abs=1e-6)
+        assert "above the sonotrode's face" in found.reasons["chamber.sonotrode_distance_mm"]
+    else:
+        assert distances[0] == pytest.approx(distances[1], abs=2e-3)  # of a higher part
+        assert lowest < -0.05
 
 
 def test_faces_do_not_take_a_name_of_the_file() -> None:

@@ -222,7 +222,7 @@ class TestNumbers:
 
     def test_every_number_can_be_read_and_set(self, design: Design) -> None:
         absent = tuple(f"effects.{name}." for name, table in design.effects if table is None)
-        absent += "holder.", "mask.", "sonotrode.blocks."
+        absent += "holder.", "mask.", "sonotrode.face."
         for name in design.numbers():
             if name not in UNSET and not name.startswith(absent):
                 assert design.changed({name: design.value(name)}) == design, name

@@ -126,16 +126,20 @@ def block_warnings(design) -> list[str]:
 def test_a_floor_of_blocks_is_simulated_as_one_face(rigid, mesh) -> None:
     width = rigid.value("chamber.diameter_mm")
     blocks = {"size_mm": [0.5 * width, width], "columns": 2}
-    made = rigid.changed({"sonotrode.blocks": blocks})
-    assert made.sonotrode.blocks.joints_mm == ([0.0], [])
-    assert made.sonotrode.blocks.in_words.startswith("2 blocks of")
+    made = rigid.changed({"sonotrode.face": blocks})
+    assert made.sonotrode.face.joints_mm == ([0.0], [])
+    assert made.sonotrode.face.in_words.startswith("2 blocks of")
     np.testing.assert_array_equal(build_chamber(made).vertices, build_chamber(rigid).vertices)
     assert block_warnings(made) == []
     large = {"size_mm": [width, width], "columns": 2}
-    (warning,) = block_warnings(rigid.changed({"sonotrode.blocks": large}))
+    (warning,) = block_warnings(rigid.changed({"sonotrode.face": large}))
     assert "wider than the floor: 2 blocks" in warning
-    assert "sonotrode.blocks.columns = 1 and sonotrode.blocks.rows = 1" in warning
-    with pytest.raises(InputError, match=r"sonotrode.blocks: 2 blocks .* but the floor needs"):
-        build_chamber(rigid.changed({"sonotrode.blocks": {**blocks, "size_mm": [10.0, width]}}))
+    assert "sonotrode.face.columns = 1 and sonotrode.face.rows = 1" in warning
+    with pytest.raises(InputError, match=r"sonotrode.face: 2 blocks .* but the floor needs"):
+        build_chamber(rigid.changed({"sonotrode.face": {**blocks, "size_mm": [10.0, width]}}))
+    disc = rigid.changed({"sonotrode.face": {"name": "A", "diameter_mm": width}})
+    np.testing.assert_array_equal(build_chamber(disc).vertices, build_chamber(rigid).vertices)
+    with pytest.raises(InputError, match=rf'sonotrode.face: "A" .* needs {width:g} mm about'):
+        build_chamber(disc.changed({"sonotrode.face.diameter_mm": width - 0.01}))
     with pytest.raises(InputError, match="each of which has its own: not supported"):
         bent(made)

@@ -125,7 +125,7 @@ def test_every_number_has_its_bounds_unit_and_description(file: EditedFile) -> N
     assert rows["process.accuracy.replicas"]["group"] == "Accuracy of the process"
     assert rows["chamber.facets"]["group"] == "Accuracy of the process"
     for name in file.design.numbers():
-        tables = ("effects.part_turn", "sonotrode.amplitude_profile", "sonotrode.blocks")
+        tables = ("effects.part_turn", "sonotrode.amplitude_profile", "sonotrode.face")
         absent = name.startswith(tables) and name[-1].isdecimal()
         if not absent and not name.startswith(
             ("part.target", "zones", "tolerances", "holder.", "mask.")

@@ -18,6 +18,7 @@ from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.design.shape_surface import TAG_SONOTRODE
+from chamberopt.design.sonotrode import Face
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Document, Section, Sentence, Table
 from chamberopt.documents.sheet import (
@@ -317,9 +318,19 @@ def test_the_section_shows_the_part() -> None:
     height = chamber.vertices[chamber.triangles][..., 2].max(axis=1)
     face = np.where(height < height.min() + 1e-9, TAG_SONOTRODE, chamber.tags).astype(np.uint8)
     chamber = replace(chamber, tags=face)
-    assert draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0)).startswith(
-        "Sections A–A and B–B"
-    )
+    drawn = draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0))
+    assert drawn.startswith("Sections A–A and B–B")
+    assert "dashed" not in drawn
+    for face, text in (
+        (Face(diameter_mm=70.0), ""),
+        (Face(diameter_mm=90.0), ", dashed: the sonotrode's rim"),
+        (
+            Face(size_mm=(80.0, 80.0), columns=2),
+            ", dashed: the joints of the floor's blocks and the sonotrode's rim",
+        ),
+    ):
+        told = draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0), face=face)
+        assert told == f"{drawn}{text}"
 
 
 def test_it_is_one_a4_page_and_replaces_only_an_older_one(

@@ -165,11 +165,10 @@ def test_balls_that_rest_on_what_is_turned_down_later_are_no_warning(
 
 
 def test_more_sonotrodes_must_save_more_time(poses: dict[Pose | None, Proposal]) -> None:
-    blocks = poses["on-edge"].design.sonotrode.blocks
-    assert blocks is not None
-    assert blocks.count > 1
-    assert poses[None].design.sonotrode.blocks is None
-    for share, taken in ((0.85 / blocks.count, None), (0.75 / blocks.count, "on-edge")):
+    count = poses["on-edge"].sonotrode_count
+    assert count > 1
+    assert poses[None].sonotrode_count == 1
+    for share, taken in ((0.85 / count, None), (0.75 / count, "on-edge")):
         first = Way(poses[None], Wanted("mm"), measured(1000.0))
         measure = pilots({None: 1000.0, "lying": 2000.0, "on-edge": share * 1000.0})
         best = propose_quicker(first, lambda one: poses[one.pose], measure)
@@ -181,9 +180,7 @@ def test_more_sonotrodes_must_save_more_time(poses: dict[Pose | None, Proposal])
 def test_a_time_that_nobody_would_run_is_worth_some_sonotrodes(
     poses: dict[Pose | None, Proposal],
 ) -> None:
-    blocks = poses["on-edge"].design.sonotrode.blocks
-    assert blocks is not None
-    assert blocks.count <= SEVERAL
+    assert poses["on-edge"].sonotrode_count <= SEVERAL
     for alone, beside, taken in ((1700.0, 840.0, None), (2000.0, 990.0, "on-edge")):
         times: dict[Pose | None, float] = {None: alone, "lying": 1990.0, "on-edge": beside}
         first = Way(poses[None], Wanted("mm"), measured(alone))

@@ -17,7 +17,6 @@ from chamberopt.chamber.propose.proposed_target import Sizes
 from chamberopt.chamber.propose.shop import Shop, example_text, load_shop, usual_shop
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
-from chamberopt.design.sonotrode import Blocks
 
 DISC = {"name": "D", "diameter_mm": 60.0, "frequency_khz": 20.0, "amplitudes_um": [20.0, 30.0]}
 SQUARE = {**DISC, "name": "S", "diameter_mm": None, "size_mm": [60.0, 50.0], "pieces": 4}
@@ -127,7 +126,8 @@ def test_blocks_side_by_side_carry_what_no_sonotrode_does(
     found = floor(plan, shape, shop(DISC, SQUARE), gap=0.001)
     assert found.lean == 0.0
     size, columns, rows = grid
-    assert found.blocks == Blocks(size_mm=size, columns=columns, rows=rows)
+    assert found.face is not None
+    assert (found.face.size_mm, found.face.columns, found.face.rows) == (size, columns, rows)
 
 
 def test_a_floor_is_made_narrower_where_that_saves_blocks() -> None:
@@ -137,7 +137,8 @@ def test_a_floor_is_made_narrower_where_that_saves_blocks() -> None:
     assert found.sizes.plan == {"length_mm": 170.0, "width_mm": 60.0}
     nearly = floor({**plan, "length_mm": 190.0}, "box", shop(DISC, SQUARE), gap=0.01)
     assert nearly.sizes.plan == {"length_mm": 200.0, "width_mm": 60.0}
-    assert found.blocks == Blocks(size_mm=(50.0, 60.0), columns=4, rows=1)
+    assert found.face is not None
+    assert (found.face.sides_mm, found.face.count) == ((200.0, 60.0), 4)
     assert found.sizes.gap == pytest.approx(0.01 - 3e-3 + 0.0)
 
 
@@ -147,8 +148,7 @@ def test_less_room_that_is_four_balls_wide_saves_a_sonotrode(ball: float, count:
     own = shop({**SQUARE, "size_mm": [60.0, 56.0]})
     sizes = Sizes("box", {"length_mm": 140.0, "width_mm": 55.0}, 0.015, 0.05, 0.02, False, 0.03)
     found = floor_on_sonotrode(sizes, 0.02, own, False, ball)
-    assert found.blocks is not None
-    assert found.blocks.count == count
+    assert found.stand.face.count == count
 
 
 def test_what_no_sonotrode_holds_is_refused_with_a_way_out() -> None:
@@ -248,8 +248,12 @@ def test_balls_are_in_stock_and_do_not_enter_the_clearance() -> None:
 
 
 def test_blocks_are_told_as_they_lie_in_the_chamber() -> None:
-    blocks = Blocks(size_mm=(80.0, 80.0), columns=2)
-    (one,) = (one for one in usual_shop().floors_of_blocks() if one.blocks == blocks)
-    assert "side by side, 2 × 1 (" in one.laid(False).in_words
-    assert "side by side, 1 × 2 (" in one.laid(True).in_words
-    assert one.laid(True).laid(True) == one
+    pairs = [one.face for one in usual_shop().stands_of_blocks() if one.face.sides_mm == (160, 80)]
+    assert [one.in_words.partition("side by side, ")[2] for one in pairs] == [
+        "2 × 1 (block of 80 mm)"
+    ]
+    assert "side by side, 1 × 2 (" in pairs[0].turned.in_words
+    assert pairs[0].turned.turned == pairs[0]
+    one = shop({**SQUARE, "size_mm": [60.0, 56.0], "pieces": 1}).stands()[0].face
+    assert one.turned.sides_mm == (56.0, 60.0)
+    assert shop(DISC).stands()[0].face.turned == shop(DISC).stands()[0].face
