@@ -115,6 +115,14 @@ class Chamber:
             tags = np.where(self.on_fixture("holder"), np.uint8(self.holder_tag), tags)
         return TriangleMesh(self.vertices, self.triangles, tags)
 
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Unit normals into the cavity at the corners of its triangles, (k, 3, 3).
+
+        On the part they are normals of the curved surface behind its facets.
+        """
+        return self.part.normals_in_cavity(self.vertices, self.triangles, self.source)
+
     @property
     def pieces_in_air(self) -> int:
         """Number of pieces of the part that reach no wall, and so have no holder."""

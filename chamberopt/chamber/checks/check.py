@@ -71,9 +71,8 @@ def shot_reach(design: Design, chamber: Chamber) -> Reach:
 
     The search takes a second or two, the first time that a chamber is asked for balls of a size.
     """
-    normals = chamber.part.normals_in_cavity(chamber.vertices, chamber.triangles, chamber.source)
     smallest, mean = min(design.shot.diameters), design.shot.diameter
-    return find_reach(chamber_mesh(chamber), smallest, mean, normals)
+    return find_reach(chamber_mesh(chamber), smallest, mean, chamber.normals)
 
 
 def touched(design: Design, chamber: Chamber) -> np.ndarray:
@@ -379,11 +378,19 @@ def sonotrode_clearance(mesh: TriangleMesh) -> float:
 
     if not ((mesh.tags == TAG_PART).any() and (mesh.tags == TAG_SONOTRODE).any()):
         return float("inf")
-    whole, least = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0))), []
-    for one, other in ((TAG_PART, TAG_SONOTRODE), (TAG_SONOTRODE, TAG_PART)):
-        corners = mesh.vertices[np.unique(mesh.triangles[mesh.tags == one])]
-        least.append(float(closest_points(mesh, corners, whole, other).distance.min()))
-    return min(least)
+    part, sonotrode = (
+        mesh.vertices[np.unique(mesh.triangles[mesh.tags == tag])]
+        for tag in (TAG_PART, TAG_SONOTRODE)
+    )
+    whole = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+    least = float(closest_points(mesh, part, whole, TAG_SONOTRODE).distance.min())
+    outside = np.maximum(
+        0.0, np.maximum(part.min(axis=0) - sonotrode, sonotrode - part.max(axis=0))
+    )
+    near = sonotrode[np.linalg.norm(outside, axis=1) < least]  # the part's box is nearer than that
+    if not len(near):  # usual, and saves a search tree of the part
+        return least
+    return float(closest_points(mesh, near, least, TAG_PART).distance.min())
 
 
 def _lowest_height(line: Axis, points: np.ndarray, amplitude: float | None) -> float:

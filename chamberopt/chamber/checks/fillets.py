@@ -169,10 +169,12 @@ def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.nda
     length = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
     along = way / length[:, None]
     turned = np.where(np.abs(turns) > np.radians(SHARP), 0.0, turns) * length
-    each = turned[:, None, None] * along[:, :, None] * along[:, None, :]
-    around = np.zeros((ends.max(initial=0) + 1, 3, 3))  # sum at each vertex
-    np.add.at(around, ends, each[:, None])
-    both = around[ends].sum(axis=1) - each  # the sum has the edge itself twice
+    each = (turned[:, None, None] * along[:, :, None] * along[:, None, :]).reshape(-1, 9)
+    places = ends.ravel()
+    around = np.column_stack(  # sum at each vertex
+        [np.bincount(places, np.repeat(column, 2)) for column in each.T]
+    )
+    both = (around[ends].sum(axis=1) - each).reshape(-1, 3, 3)  # the sum has the edge itself twice
     across: np.ndarray = np.einsum("ei,eij,ej->e", along, both, along)
     return across
 

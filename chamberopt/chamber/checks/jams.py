@@ -79,8 +79,7 @@ def find_gaps(chamber: Chamber, diameters: Sequence[float], beside_walls: bool =
     if beside_walls:  # which are as their facets
         chosen = mesh.tags != TAG_PART
     else:
-        surface = chamber.vertices, chamber.triangles, chamber.source
-        normals = chamber.part.normals_in_cavity(*surface)
+        normals = chamber.normals
     touches, spacing = find_touches(mesh, min(diameters), limit, normals, chosen)
     return _gaps(touches, None, spacing, min(diameters))
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from chamberopt.chamber.checks.gaps import CLOSED
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.propose.held_proposal import (
     clamped_outside,
@@ -321,7 +322,7 @@ def _proposed(
                 continue
             if best is None or faults(made) < faults(best[0]):
                 best = made, floor
-            if not any(word in text for text in made.warnings for word in ("gap", "side wall")):
+            if not any(_takes_room(text) for text in made.warnings):
                 break
         if best is None:
             assert refused is not None
@@ -356,6 +357,14 @@ def _proposed(
     if wanted.ball_mm is not None and touched_share(made) < LEAST_TOUCHED:
         raise InputError(_too_large(made, shop.stock_mm(shot)))
     return replace(made, reasons={**made.reasons, **_room_reason(made, floor)})
+
+
+def _takes_room(warning: str) -> bool:
+    """Return whether a warning tells of a gap or a gutter that more room beside the part may end.
+
+    A gap between two faces of the part is left as it is.
+    """
+    return "side wall" in warning or ("gap" in warning and CLOSED not in warning)
 
 
 def _too_large(made: Proposal, stock_mm: Sequence[float]) -> str:

@@ -322,7 +322,7 @@ def test_the_section_shows_the_part() -> None:
     assert drawn.startswith("Sections A–A and B–B")
     assert "dashed" not in drawn
     for face, text in (
-        (Face(diameter_mm=70.0), ""),
+        (Face(diameter_mm=40.0), ""),
         (Face(diameter_mm=90.0), ", dashed: the sonotrode's rim"),
         (
             Face(size_mm=(80.0, 80.0), columns=2),
