@@ -86,7 +86,7 @@ from chamberopt.common.toml_fields import MAX_COORDINATE_MM
 from chamberopt.design.design import Design, validate
 from chamberopt.design.materials import CATALOGUE, USUAL, alloy, ball, balls
 from chamberopt.geometry.heights import lowest_over
-from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
+from chamberopt.geometry.meshes.part_mesh import PartMesh, keep_part, read_part_cached
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import BY_SIZE, METRES_PER
 from chamberopt.geometry.triangles import rotation_matrix
@@ -333,15 +333,18 @@ def _proposed(
         made, floor = built(is_local=goes_out)
         if not goes_out and (not floor.is_one_sonotrode or is_capped(made)):
             with suppress(InputError):
-                local = built(is_local=True)
-                fits = local[1].is_one_sonotrode and not is_capped(local[0])
-                if fits and faults(local[0]) <= faults(made):
-                    made, floor = local
+                local, its_floor = built(is_local=True)
+                if its_floor.is_one_sonotrode and not is_capped(local):
+                    if not local.chamber.pieces_in_air:
+                        local = clamped_outside(local, its_floor, wanted.shop)
+                        local = padded(local, its_floor, target, wanted.shop)
+                    if faults(local) <= faults(made):
+                        made, floor = local, its_floor
     if made.chamber.pieces_in_air:
         with step("choosing what holds the part") as progress:
             above = None if goes_out else end
             made = held(made, floor, target, above, bores, wanted.shop, progress)
-    else:
+    elif "holder" not in made.tables:
         made = clamped_outside(made, floor, wanted.shop)
     may_turn = wanted.may_turn and wanted.pose is None
     turning = turning_bore(bores, mesh, target.triangles) if may_turn else None
@@ -430,10 +433,11 @@ def _hardness_in_words(part: str, shot: str) -> str:
 def _read(path: Path, unit: str) -> PartMesh:
     """Return the part in a file. Messages name the option --unit, not the design's part.unit."""
     try:
-        mesh = read_part(path, unit)
+        mesh = read_part_cached(path, unit)
     except InputError as error:
         error.args = (str(error).replace("part.unit", "--unit"),)
         raise
+    keep_part(mesh, path, mesh.unit)  # designs name the unit
     return replace(mesh, notes=tuple(note.replace("part.unit", "--unit") for note in mesh.notes))
 
 

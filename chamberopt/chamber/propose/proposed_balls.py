@@ -95,7 +95,9 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
     spacing = np.empty(len(size))
     for rows in (part.target, ~part.target):
         spacing[rows] = np.sqrt(size[rows].sum() / POINTS)
-    triangle, point, area = spread_points(part.vertices, part.triangles, spacing)
+    triangle, point, area = _thinned(
+        *spread_points(part.vertices, part.triangles, spacing), spacing
+    )
     corners = part.vertices[part.triangles[triangle]]
     normal = unit_vectors(interpolate(part.corner_normals[triangle], corners, point))
     edges = inner_edges(part.vertices, part.triangles, part.target, part.hollow)
@@ -129,6 +131,23 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
             fillets = float(area[touched & narrow].sum()) / of_narrow
         fits.append(SizeFit(one, touch, serve, bool(suits), jam, count, fillets))
     return fits
+
+
+def _thinned(
+    triangle: np.ndarray, point: np.ndarray, area: np.ndarray, spacing: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return of points on a fine mesh, each with its triangle and area, so many as are wanted.
+
+    One is taken wherever the area of those before it has grown by what a point shall stand for.
+
+    Args:
+        triangle, point, area: of all points, (p,), (p, 3) [m] and (p,) [m²].
+        spacing: wanted distance between points on each triangle [m], (m,).
+    """
+    for_each = spacing[triangle] ** 2
+    taken = np.diff(np.floor(np.cumsum(area / for_each) + 0.5), prepend=0.0)
+    rows = np.flatnonzero(taken)
+    return triangle[rows], point[rows], (taken * for_each)[rows]
 
 
 def tolerated_overlap(diameter: float) -> float:

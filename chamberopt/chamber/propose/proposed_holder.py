@@ -84,6 +84,8 @@ class _Seen(NamedTuple):
     face: np.ndarray  # marks those of the face, (m,)
     target: np.ndarray  # (m,)
     hull: np.ndarray  # of the face [m], (n, 2)
+    # The narrowest rectangle round the hull: middle, sides and axes.
+    rectangle: tuple[np.ndarray, np.ndarray, np.ndarray]
     clear: float  # least distance from the target [m]
     where: str  # "up" or "aside"
 
@@ -181,26 +183,28 @@ def _on_flat_faces(
         up = bool(normal[2] > UP)
         axis = np.array([0.0, 0.0, 1.0]) if up else normal
         along = axis / np.linalg.norm(axis)
-        corners = (posed @ frame_along(along).T)[mesh.triangles]
         own = faces.of_triangle == face
-        hull = convex_hull(corners[own].reshape(-1, 3)[:, :2])
+        seen_along = posed @ frame_along(along).T
+        of_face = seen_along[mesh.triangles[own]].reshape(-1, 3)
+        hull = convex_hull(of_face[:, :2])
         if hull is None:
             continue
-        seen = _Seen(corners, own, target, hull, CLEAR * ball, "up" if up else "aside")
+        rectangle, level = narrowest_rectangle(hull), float(of_face[:, 2].max())
+        middle = np.r_[centroid(hull), level] @ frame_along(along) @ turn
+        is_wide = rectangle[1].min() >= min(WIDE, WIDE_SHARE * width) and not faces.is_facet(
+            face, ROUND_DEG
+        )
+        stands = is_wide and carries(mesh, middle, along @ turn)
+        if not stands and seen_along[:, 2].max() > level + HIGHER:  # it closes no end either
+            continue
+        where, corners = "up" if up else "aside", seen_along[mesh.triangles]
+        seen = _Seen(corners, own, target, hull, rectangle, CLEAR * ball, where)
         place = {"at_mm": faces.place_mm(face), "crease_deg": FLAT_DEG}
         at: dict[str, Any] = {"at": {"faces": [place]}}
         at |= {} if up else {"axis": axis.tolist()}
-        on_face = _rod(seen, float(faces.area[face]))
         holes = _holes(seen, axis, posed, mesh.triangles, bores)
-        if on_face is None or 1e-3 * on_face.keys["diameter_mm"] < SLIM * width:
-            on_face = _block(seen, float(faces.area[face]), LONG_FACE) or on_face
-        elif holes and (block := _block(seen, float(faces.area[face]), 1.0)) is not None:
-            more = len(_bolts(seen, block, holes)) > len(_bolts(seen, on_face, holes))
-            on_face = block if more else on_face
-        middle = np.r_[centroid(hull), seen.level] @ frame_along(along) @ turn
-        is_wide = narrowest_rectangle(hull)[1].min() >= min(WIDE, WIDE_SHARE * width)
-        if not (is_wide and carries(mesh, middle, along @ turn)) or faces.is_facet(face, ROUND_DEG):
-            on_face = None
+        area = float(faces.area[face])
+        on_face = _on_face(seen, area, holes, SLIM * width) if stands else None
         for made in (_around_end(seen), on_face):
             if made is not None:
                 bolts = [] if made.is_round_an_end else _bolts(seen, made, holes)
@@ -208,6 +212,22 @@ def _on_flat_faces(
                 pins = tuple(one.wall for one in bolts if one.is_in_target)
                 choice = HolderChoice({**made.keys, **at}, reason, pins)
                 yield _OnFace(choice, axis, float(round(1e3 * seen.level)))
+
+
+def _on_face(seen: _Seen, area: float, holes: Sequence[_Hole], slim: float) -> HolderChoice | None:
+    """Return a rod or a block on a face, whichever is firmer; None if there is no room for one.
+
+    Args:
+        area: of the face [m²].
+        holes: those that open in it.
+        slim: diameter of a rod [m] below which a block is taken.
+    """
+    rod = _rod(seen, area)
+    if rod is None or 1e-3 * rod.keys["diameter_mm"] < slim:
+        return _block(seen, area, LONG_FACE) or rod
+    if holes and (block := _block(seen, area, 1.0)) is not None:
+        return block if len(_bolts(seen, block, holes)) > len(_bolts(seen, rod, holes)) else rod
+    return rod
 
 
 class _Hole(NamedTuple):
@@ -244,7 +264,7 @@ def _bolts(seen: _Seen, holder: HolderChoice, holes: Sequence[_Hole]) -> list[_H
     if holder.keys["kind"] == "rod":
         middle, reach = centroid(seen.hull), 5e-4 * holder.keys["diameter_mm"]
         return [h for h in holes if np.linalg.norm(h.middle - middle) + h.radius < reach]
-    middle, _, axes = narrowest_rectangle(seen.hull)
+    middle, _, axes = seen.rectangle
     half = 5e-4 * np.array(holder.keys["size_mm"])
     return [h for h in holes if (np.abs(axes @ (h.middle - middle)) + h.radius < half).all()]
 
@@ -324,7 +344,8 @@ def _of_end(
     hull = convex_hull(corners[end].reshape(-1, 3)[:, :2])
     if hull is None:
         return None
-    return _around_end(_Seen(corners, end, target, hull, clear, where))
+    rectangle = narrowest_rectangle(hull)
+    return _around_end(_Seen(corners, end, target, hull, rectangle, clear, where))
 
 
 def _around_end(seen: _Seen) -> HolderChoice | None:
@@ -332,7 +353,7 @@ def _around_end(seen: _Seen) -> HolderChoice | None:
     level, highest = seen.level, seen.highest
     if highest.max() > level + HIGHER:
         return None
-    middle, sides, axes = narrowest_rectangle(seen.hull)
+    middle, sides, axes = seen.rectangle
     round_middle = centroid(seen.hull)
     outer = radii(seen.hull, round_middle)[1]
     is_round = math.pi * outer**2 < sides.prod()
@@ -369,7 +390,7 @@ def _block(seen: _Seen, area: float, long: float) -> HolderChoice | None:
     Args:
         long: least length of the face over its width.
     """
-    middle, sides, axes = narrowest_rectangle(seen.hull)
+    middle, sides, axes = seen.rectangle
     if sides.max() < long * sides.min() or area < FILLED * sides.prod():
         return None
     along = np.abs((seen.corners[..., :2] - middle) @ axes.T).min(axis=1)  # (m, 2)
