@@ -93,7 +93,7 @@ listen((what) => { if (what === "changed" && seen.length) refresh().catch(() => 
 
 // Show what a command has found.
 const showFolder = (folder) => attempt(async () => {
-  document.querySelector("[data-tab=results]").click();
+  if (find("study-view").hidden) document.querySelector("[data-tab=results]").click(); // a study stays beside its result
   await refresh(() => [folder]);
   if (ticked().length) await show();
 });

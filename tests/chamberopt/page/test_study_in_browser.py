@@ -89,6 +89,13 @@ def test_a_study_is_followed_and_a_candidate_taken(opened: Page, out: Path) -> N
     expect(page.locator("#unsaved")).to_have_text("not saved yet")
     assert float(page.locator('[id="chamber.height_mm"]').input_value()) == height
     assert opened.saved().chamber.height_mm == height
+    beside_study = page.locator("#view").bounding_box()
     page.click("#close-study")
     expect(page.locator("#study-view")).to_be_hidden(timeout=WAIT)
+    alone = page.locator("#view").bounding_box()
+    assert beside_study["width"] > 0.85 * alone["width"]  # the view keeps its room
+    assert beside_study["height"] == alone["height"]
+    page.click("text=see its candidates")
+    opened.tab("numbers")  # which is in the place of the study
+    expect(page.locator("#study-view")).to_be_hidden()
     assert opened.errors == []
