@@ -58,23 +58,37 @@ def summary(comparison: Comparison) -> list[Table | str]:
 
 
 def _sentence(comparison: Comparison, name: str, label: Label, k: int) -> str:
-    """Return in one sentence how a later candidate compares with the first one in a figure.
+    """Return in one sentence which is better, a later candidate or the first, and by how much.
 
     Args:
-        name, label: of the figure.
+        name, label: of the figure, which is better the larger its stored value is.
         k: place of the candidate among the later ones.
     """
     first, later = comparison.labels[0], comparison.labels[1 + k]
     before, after = (comparison.metrics[name][one] for one in (0, 1 + k))
     gap = comparison.differences[name][k]
     if not (before.has_number and after.has_number) or gap.in_words:
-        return f"Whether the {label.text} of {later} and {first} differs is not resolved."
-    values = f"the {label.text} is {label.format(after)}, that of {first} {label.format(before)}"
+        return (
+            f"No difference is resolved between {later} and {first}: too few dents were simulated "
+            f"to tell the {label.text} of both."
+        )
     if gap.value == 0.0 and gap.half_width == 0.0:
-        return f"{later}: {values}: no difference."
+        return f"{later} is like {first}: the {label.text} of both is {label.format(after)}."
     change = label.format(gap.estimate, sign=True)
-    noise = "more than noise" if gap.real else "within the noise"
-    return f"{later}: {values}: a difference of {change}, {noise}."
+    if not gap.real:
+        values = f"{label.format(after)} against {label.format(before)}; 95 % intervals"
+        return (
+            f"No difference is resolved between {later} and {first}: {change} in the {label.text} "
+            f"is within the noise ({values})."
+        )
+    better, other, high, low = (later, first, after, before)
+    if gap.value < 0.0:
+        better, other, high, low = (first, later, before, after)
+    side = "higher" if label.factor > 0.0 else "lower"
+    return (
+        f"{better} is better than {other}: the {label.text} is {side} by {change.lstrip('+−')} "
+        f"({label.format(high)} against {label.format(low)}; 95 % intervals)."
+    )
 
 
 def comparison_lines(comparison: Comparison) -> list[Table | str]:

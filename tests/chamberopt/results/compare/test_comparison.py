@@ -21,7 +21,7 @@ from chamberopt.coverage.stress_knowledge import BANDS
 from chamberopt.design.calibration import Calibration, LawCalibration, Misfit, law_metal
 from chamberopt.design.load import load_design
 from chamberopt.documents.comparison import comparison_end, comparison_lines
-from chamberopt.documents.wording import metric_label
+from chamberopt.documents.wording import metric_label, objective_label
 from chamberopt.page.acts import list_results
 from chamberopt.printers import terminal
 from chamberopt.results.arrays_file import ResultArrays
@@ -352,8 +352,19 @@ def test_the_end_is_a_sentence_for_each_and_the_main_figures_in_words(
     assert all(mean.number(one) in shown for one in values)
     assert (f"{mean.number(gap.estimate, sign=True)} *" in shown) is (len(names) == 1)
     assert f"{mean.number(values[1])} *" in shown or len(names) == 1
-    sentences = [one for one in end if isinstance(one, str) and one.startswith((*names,))]
-    assert [one[0] for one in sentences] == [*names]
-    assert sentences[0].endswith("more than noise.")
+    sentences = [one for one in end if isinstance(one, str) and " better " in one]
+    if len(names) == 1:  # one sentence says which is better, and by how much
+        goal = objective_label("uniform_coverage")
+        (gap, *_), (low, high) = (
+            both.differences["uniform_coverage"],
+            both.metrics["uniform_coverage"],
+        )
+        change = goal.format(gap.estimate, sign=True).removeprefix("+")
+        better = f"b is better than a: the {goal.text} is higher by {change}"
+        assert sentences == [
+            f"{better} ({goal.format(high)} against {goal.format(low)}; 95 % intervals)."
+        ]
+    else:
+        assert len(sentences) + text.count("No difference is resolved between c and a: ") == 2
     assert "mean_coverage" not in text
     assert "mean_coverage" in terminal.text(comparison_end(both, True))
