@@ -6,6 +6,7 @@ import re
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import count, product
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,7 @@ from chamberopt.coverage.metrics import OBJECTIVES, metric_problem
 from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
 from chamberopt.documents.answer import on_average
+from chamberopt.documents.document import Section, Sentence
 from chamberopt.documents.overview import comparison_overview
 from chamberopt.documents.proposal import matter_of
 from chamberopt.documents.report import answer_section
@@ -148,6 +150,8 @@ def _stale(result: Result, now: Design) -> str:
 def shown(folders: Sequence[Path]) -> dict[str, object]:
     """Return the 3D view of results side by side, with the answer of one or the comparison of two.
 
+    What is answered stands above the view, and its figures below.
+
     Where one does not tell the peening strength, `longer` has how many times as long a simulation
     tells it, and this time as values of the design.
 
@@ -164,7 +168,13 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
         if (times := times_longer(result)) > 1:
             now = result.design.process.accuracy.simulated_time_s
             longer = {"times": times, "values": {SIMULATED_TIME: float(f"{times * now:.4g}")}}
-    html = explained(section(first, viewer) + html)
+    answers = [one for one in first.content if isinstance(one, Sentence) and one.kind in ANSWERS]
+    figures = [one for one in first.content if one not in answers]
+    html = explained(
+        section(replace(first, content=answers), viewer)
+        + html
+        + section(Section("In figures", figures), viewer)
+    )
     return {"content": content, "html": html, "longer": longer}
 
 
@@ -181,6 +191,7 @@ def difference(folders: Sequence[Path]) -> dict[str, str]:
         return {"picture": f"data:image/png;base64,{b64encode(read_file(picture)).decode()}"}
 
 
+ANSWERS = "sentence", "warning"  # kinds of sentences that stand above the view of a result
 SIMULATED_TIME = "process.accuracy.simulated_time_s"
 MOST_FILES = 20  # versions of the design's text that are kept for the pages that read them
 STUDY_NAME = re.compile(r"\w[\w .+-]{0,100}\.toml")

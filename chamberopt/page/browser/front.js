@@ -160,12 +160,12 @@ function tell({ steps, seconds, printed, warnings, fault, exit, picture, result,
     find("picture").href = `/files/${picture[0].split("/").map(encodeURIComponent).join("/")}?${drawn = picture[1]}`;
     find("picture").firstElementChild.src = find("picture").href;
   }
-  find("proposal").hidden = !proposal;
+  find("proposal").hidden = find("sentence").hidden = !proposal;
   find("rows-fold").hidden = !proposal;
   find("another").hidden = !proposal || !known.part;
   const isDraft = exit === null, now = JSON.stringify([proposal, result, isDraft]);
   if (proposal && drawnPart && now !== told) attempt(() => drawChamber(isDraft));
-  find("draft").hidden = !isDraft;
+  find("draft").hidden = !isDraft || !proposal;
   find("made-end").hidden = isDraft;
   if (!proposal || now === told) return; // its buttons stay while one is pointed at
   told = now;

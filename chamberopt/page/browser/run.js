@@ -110,6 +110,7 @@ function show({ command, result, steps, seconds, printed, exit }) {
   allow();
   const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
   find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...toResult(command, result, exit));
+  find("study-progress").replaceChildren(...(study ? [...find("progress").children].map((one) => one.cloneNode(true)) : [])); // which is in its place
   find("printed").replaceChildren(...asLines(printed));
   find("printed-fold").hidden = !printed.length;
   if (exit) find("printed-fold").open = true;

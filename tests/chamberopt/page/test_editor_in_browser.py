@@ -524,8 +524,10 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     page.click("#search-sliders")
     expect(page.locator("#message")).to_contain_text("written: stopped.toml")
     expect(page.locator("#lasts")).to_be_hidden()  # while it runs
-    page.click("#stop")
+    expect(page.locator("#study-progress")).to_contain_text("at work for")
+    page.click("#study-stop")
     expect(page.locator("#progress")).to_contain_text("stopped", timeout=WAIT)
+    expect(page.locator("#study-progress")).to_be_empty()
     page.click("#close-study")
     page.locator("#progress").get_by_text("See its candidates").click()
     expect(page.locator("#study-view")).to_be_visible(timeout=WAIT)
@@ -559,6 +561,11 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     page.click("#show-results")
     opened.wait("data-drawn=yes")
     assert page.locator("#shown #part-0 canvas").count() == 1
+    answer, drawn, figures = (
+        page.locator(one).bounding_box()["y"]
+        for one in ("#shown .answer", "#part-0", "#shown section:last-of-type")
+    )
+    assert answer < drawn < figures
     shown = page.locator("#shown")
     expect(shown).to_contain_text("Almen intensity: not known: too few dents were simulated")
     longer = page.locator('[id="process.accuracy.simulated_time_s"]')
@@ -581,6 +588,7 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     page.click("#show-results")
     expect(page.locator("#difference")).to_contain_text("Difference of coverage", timeout=WAIT)
     expect(page.locator("#difference")).not_to_contain_text("drawing where", timeout=WAIT)
+    expect(page.locator("#shown .answer")).to_contain_text(" of both")
     assert page.locator("#difference img").count() or "OpenGL" in page.text_content("#difference")
     page.locator('[id="shot.mass_g"]').evaluate("one => { one.value = 2.9; }")
     page.locator('[id="shot.mass_g"]').dispatch_event("change")

@@ -68,6 +68,8 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             expect(page.locator("#sentence")).to_contain_text("Peen face 1 (")
             page.wait_for_function(IS_LOADED)
             opened.wait("data-chamber=proposal")  # it is seen in 3D too
+            sentence, drawn = (page.locator(one).bounding_box() for one in ("#sentence", "#view"))
+            assert sentence["y"] + sentence["height"] <= drawn["y"]  # what is proposed comes first
             kinds = {"target", "sonotrode", "chamber wall"}
             expect(page.locator("#legend")).to_contain_text("chamber wall")  # at the next frame
             assert set(page.locator("#legend li").all_text_contents()) >= kinds

@@ -61,6 +61,7 @@ async function look() {
     find("study-sentence").textContent = running() === mine ? "No candidate yet." : error.message; // its folder is not there at once
   }
   const ours = running() === mine;
+  find("study-progress").hidden = !ours;
   find("study-stop").disabled = !ours;
   find("study-resume").disabled = Boolean(running()) || Boolean(data?.finished);
   find("study-result").disabled = !data?.finished;
