@@ -316,6 +316,7 @@ class Acts:
             "folder": str(file.folder),
             **_told_of(file),
             "chosen": {name: _chosen(design, name) for name in picked_surfaces(design)},
+            "is_proposed": file.is_proposed,
             "is_drawn": design.chamber.setup() is not None,
             "files": _files_beside(file.path),
             "aims": [(name, AIMS[name]) for name in _aims(design)],

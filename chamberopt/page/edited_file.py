@@ -43,6 +43,9 @@ Changes = Mapping[str, Any]
 LONGEST_SAVE_S = 5.0  # wait for another page's save, which takes a tenth of a second
 LATE_WRITE_S = 0.05  # an editor takes far less from opening a file to writing it
 FACETS, ACCURACY = "chamber.facets", "process.accuracy"  # a number, and where it is shown
+# A proposed design begins with this; the comment behind each number is then the reason for it.
+PROPOSED = "proposed by `chamberopt new`"
+CHANGED = "changed by you; proposed was "  # and the value, before the reason behind that
 TO_SETTLE = "to_settle"  # from which the page takes out what is settled
 # Keys that the page changes beside its fields: zones, and the faces of target, zone or fixture.
 PICKED = re.compile(
@@ -106,7 +109,8 @@ class EditedFile:
     def changed_text(self, changes: Changes) -> str:
         """Return the text of the file with some values changed.
 
-        Comments, order and other lines stay. `changes` has new values by dotted name.
+        Comments, order and other lines stay, but that the reason behind a proposed number says of
+        what number it was. `changes` has new values by dotted name.
 
         Raises:
             InputError: the page may not change a key, or the key stands in the file in a form that
@@ -136,7 +140,15 @@ class EditedFile:
                     f"{name}: the page cannot change it where the file says it ({error}); write "
                     "its table with a header of its own, as [part.target]"
                 ) from None
+        if self.is_proposed:
+            for name in changes.keys() & known:
+                _keep_reason_true(tomlkit.parse(self.text), document, name)
         return tomlkit.dumps(document) if changes else self.text
+
+    @property
+    def is_proposed(self) -> bool:
+        """True if the comments in the file are reasons of the values that were proposed."""
+        return PROPOSED in self.text.partition("\n")[0]
 
     def with_steps(self, kept: Sequence[int]) -> EditedFile:
         """Return the file as it would be with some of its steps alone.
@@ -253,6 +265,28 @@ class EditedFile:
         for step in steps:
             value = getattr(value, step)
         return value
+
+
+def _keep_reason_true(before: Any, after: Any, name: str) -> None:
+    """Let the comment behind a changed value say which value it was the reason of.
+
+    Args:
+        before, after: the parsed file as it is and as it would be.
+        name: dotted name of the value; of an item of a list, the reason is behind the list.
+    """
+    steps = [step for step in name.split(".") if not step.isdecimal()]
+    for step in steps:
+        before, after = (
+            one.get(step) if isinstance(one, Mapping) else None for one in (before, after)
+        )
+    if before is None or after is None or not before.trivia.comment:
+        return
+    reason = before.trivia.comment.lstrip("#").strip()
+    proposed = before.as_string()
+    if reason.startswith(CHANGED):
+        proposed, _, reason = reason.removeprefix(CHANGED).partition(": ")
+    is_back = after.as_string() == proposed
+    after.trivia.comment = f"# {reason}" if is_back else f"# {CHANGED}{proposed}: {reason}"
 
 
 def custom_shape(data: Mapping[str, object]) -> str:

@@ -39,6 +39,21 @@ def test_one_number_is_one_line(file: EditedFile) -> None:
     assert EditedFile(file.path, False).design == changed
 
 
+def test_the_reason_of_a_changed_number_says_of_what_it_was(file: EditedFile) -> None:
+    """In a proposed design the comments are reasons; in others they stay as they are."""
+    text = file.path.read_text().replace("# to try", "# room for two balls")
+    file.path.write_text(f"# A first chamber, proposed by `chamberopt new`: rules.\n{text}")
+    for height, comment in (
+        (40, "changed by you; proposed was 30: room for two balls"),
+        (42, "changed by you; proposed was 30: room for two balls"),
+        (30, "room for two balls"),
+    ):
+        EditedFile(file.path, False).save({"chamber.height_mm": height})
+        assert f"height_mm = {height}   # {comment}\n" in file.path.read_text()
+        rows = {one["name"]: one for one in design_fields(EditedFile(file.path, False))}
+        assert rows["chamber.height_mm"]["reason"] == [comment]
+
+
 @pytest.mark.parametrize(
     ("changes", "written"),
     [

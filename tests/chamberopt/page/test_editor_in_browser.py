@@ -66,6 +66,16 @@ def test_a_number_changes_the_shape_the_facts_and_one_line(opened: Page) -> None
     assert said == [one.text for one in told]
 
 
+def test_a_slider_has_its_ends_again_after_undo(opened: Page) -> None:
+    slider = opened.page.locator("[type=range][aria-label='chamber.height_mm']")
+    before = [slider.get_attribute(end) for end in ("min", "max")]
+    opened.put("chamber.height_mm", 200)
+    assert [slider.get_attribute(end) for end in ("min", "max")] == [before[0], "200"]
+    opened.page.click("#undo")
+    assert [slider.get_attribute(end) for end in ("min", "max")] == before
+    opened.wait("data-checked=reach")
+
+
 def test_a_young_run_tells_the_time_that_is_left(opened: Page) -> None:
     """Of 24 replicas 0.2 are done in 8 s, after nothing in 9 s; then half an evaluation in 6 s.
 

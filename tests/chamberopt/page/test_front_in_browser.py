@@ -94,6 +94,12 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             label = page.locator('label[for="chamber.height_mm"]')
             expect(label).to_contain_text("Height")
             expect(label).to_contain_text("sonotrode to ceiling")  # the reason of its number
+            opened.put("chamber.height_mm", 77)
+            proposed = page.locator('label[for="chamber.height_mm"] .struck')
+            expect(proposed).to_contain_text("sonotrode to ceiling")  # which is of another number
+            expect(label).to_contain_text("changed by you; proposed was ")
+            page.click("#undo")
+            expect(proposed).to_have_count(0)
             assert page.locator('[id="process.coverage_percent"]').input_value() == "200"
             page.click("#front")
             expect(page.locator("#designs")).to_contain_text("my part/design.toml")
