@@ -91,8 +91,9 @@ const shows = (named, name) => lights(named, view, () => ask("/face", { part: kn
 
 // Read a part, to say its size, and to ask for its unit where the file states none.
 async function look(part, unit = "") {
+  if (part !== known.part) find("sizes").hidden = true;
   Object.assign(known, { part, unit });
-  find("propose").disabled = find("sizes").hidden = find("names").hidden = true;
+  find("propose").disabled = find("names").hidden = true;
   find("known").textContent = part ? `reading ${part} …` : "";
   document.body.dataset.known = "";
   if (!part) { draw(""); return; }
@@ -100,12 +101,13 @@ async function look(part, unit = "") {
     const seen = await ask("/look", { part, unit });
     if (known.part !== part || known.unit !== unit) return;
     const sizes = Object.entries(seen.sizes);
-    find("sizes").hidden = !sizes.length;
-    find("sizes").replaceChildren(find("sizes").firstElementChild, ...sizes.map(([name, size]) => {
-      const button = element("button", { textContent: `${size} (numbers in ${name === "in" ? "inches" : name})` });
+    if (!unit || sizes.length) find("sizes").hidden = !sizes.length; // a unit that was chosen can be chosen anew
+    if (sizes.length) find("sizes").replaceChildren(find("sizes").firstElementChild, ...sizes.map(([name, size]) => {
+      const button = element("button", { value: name, textContent: `${size} (numbers in ${name === "in" ? "inches" : name})` });
       button.addEventListener("click", () => attempt(() => look(part, name)));
       return element("span", {}, button, " ");
     }));
+    for (const button of find("sizes").querySelectorAll("button")) button.ariaPressed = String(button.value === unit);
     find("names").hidden = !seen.names.length;
     find("names").replaceChildren(find("names").firstElementChild, ...seen.names.map(([name, text]) =>
       shows(element("label", {}, element("input", { type: "checkbox", value: name }), ` ${name}: ${text}`), name)));

@@ -42,7 +42,10 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             opened.wait("data-known=sizes")  # an STL states no unit
             assert page.locator("#propose").is_disabled()
             opened.wait("data-drawn='my part.stl'")  # before its unit is known
-            page.click("#sizes button >> text=in mm)")
+            page.click("#sizes button >> text=in inches)")
+            expect(page.locator("#known")).to_contain_text("measures 406.4 x 406.4 x 406.4 mm")
+            page.click("#sizes button >> text=in mm)")  # it can be chosen anew
+            expect(page.locator("#sizes [aria-pressed=true]")).to_contain_text("in mm)")
             opened.wait("data-known=all")
             expect(page.locator("#known")).to_contain_text("my part.stl measures 16 x 16 x 16 mm")
             box = page.locator("#propose").bounding_box()
