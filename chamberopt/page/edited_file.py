@@ -22,7 +22,7 @@ from chamberopt.common.toml_errors import text_choices
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design, validate
 from chamberopt.design.fixture import HOLDER_KEYS, Holder
-from chamberopt.design.materials import BY_NAME
+from chamberopt.design.materials import BY_NAME, SURFACES, alloys
 from chamberopt.design.shapes.base import is_custom
 from chamberopt.page.page_words import choices, on_page
 from chamberopt.page.structure import (
@@ -122,7 +122,7 @@ class EditedFile:
         if KEPT in changes:
             others = {name: value for name, value in changes.items() if name != KEPT}
             return self.with_steps(changes[KEPT]).changed_text(others)
-        document, known = tomlkit.parse(self.text), field_names(self.design)
+        document, known = tomlkit.parse(self.text), {*field_names(self.design), *self.alloys()}
         # What is taken out goes first: it may be chosen anew after that.
         for name, value in sorted(changes.items(), key=lambda one: one[1] not in (None, "")):
             is_own = name in known or PICKED.fullmatch(name)
@@ -201,6 +201,16 @@ class EditedFile:
                 f"{self.path.name}: changed on disk since this page read it, so it is not "
                 "replaced; reload the page to go on from what it says now"
             )
+
+    def alloys(self) -> dict[str, str]:
+        """Return the names of alloys that the file gives, by the dotted names of their keys."""
+        found, tables = {}, tomllib.loads(self.text).get("materials", {})
+        for name, given in tables.items() if isinstance(tables, dict) else ():
+            if name in SURFACES and isinstance(given, str):
+                found[f"materials.{name}"] = given
+            elif name in SURFACES and isinstance(given, dict) and "alloy" in given:
+                found[f"materials.{name}.alloy"] = str(given["alloy"])
+        return found
 
     def is_fixed(self, name: str) -> bool:
         """Return True if a number cannot be edited because its table is given by a name.
@@ -289,6 +299,11 @@ def _keep_reason_true(before: Any, after: Any, name: str) -> None:
     after.trivia.comment = f"# {reason}" if is_back else f"# {CHANGED}{proposed}: {reason}"
 
 
+def alloy_suggestions() -> list[tuple[str, str]]:
+    """Return the name of each alloy of the catalogue, and what metal it is."""
+    return [(one.name, one.metal) for one in alloys()]
+
+
 def custom_shape(data: Mapping[str, object]) -> str:
     """Return the Python file that a design names as its chamber's shape, or "" for other shapes.
 
@@ -348,7 +363,19 @@ def design_fields(file: EditedFile) -> list[dict[str, object]]:
     design, varied = file.design, set(file.design.numbers())
     reasons = comments(file.text)
     rows: list[dict[str, Any]] = []
+    named = [
+        {
+            "name": name,
+            "value": value,
+            "suggestions": alloy_suggestions(),
+            "text": f"alloy of the {name.split('.')[1]}",
+            "reason": reasons.get(name, ""),
+        }
+        for name, value in file.alloys().items()
+    ]
     for name, field in _numbers(design):
+        if name.startswith("materials."):  # the alloys stand before their numbers
+            rows, named = rows + named, []
         row: dict[str, Any] = {"name": name, "value": _value(design, name), **_bounds(field)}
         extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
         unit = extra.get("unit", "") or unit_of(name)

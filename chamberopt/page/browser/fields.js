@@ -16,7 +16,7 @@ export function makeFields() {
     const isPose = POSE.some((name) => field.name.startsWith(name));
     if (isPose && state.file.is_drawn) continue; // where its file has it
     const { table } = field;
-    const row = field.choices ? choiceRow(field) : numberRow(field);
+    const row = field.choices ? choiceRow(field) : field.suggestions ? nameRow(field) : numberRow(field);
     if (isPose) { pose.append(row); continue; }
     if (!groups.has(table)) groups.set(table, element("details", { id: `of-${table}`, open: opened.get(`of-${table}`) ?? OPEN.includes(table) }, element("summary", { textContent: field.group, title: `[${table}]` })));
     groups.get(table).append(row);
@@ -33,13 +33,13 @@ const label = (field) => element("label", { title: `${field.name} in the file`, 
   element("b", { textContent: field.label }), " ", ...onPage(field.text),
   ...(field.reason.length ? [element("small", {}, element("span", { className: "changed-by" }), element("span", { className: "reason" }, ...onPage(field.reason)))] : []));
 
-// The reason of a number is that of the number in the file, and is struck where a proposed one was changed.
+// The reason of a number is that of the number in the file, and is struck where that was changed.
 function showReason(row, field, now) {
   const [changed, reason] = [".changed-by", ".reason"].map((name) => row.querySelector(name)), was = original(field.name);
   if (!reason || reason.textContent.startsWith("changed by you")) return;
   const isChanged = now !== was;
   changed.textContent = isChanged ? `changed by you; ${state.file.is_proposed ? "proposed was" : "in the file it is"} ${was ?? "none"}. ` : "";
-  reason.classList.toggle("struck", isChanged && state.file.is_proposed);
+  reason.classList.toggle("struck", isChanged);
 }
 
 function choiceRow(field) {
@@ -50,6 +50,22 @@ function choiceRow(field) {
   });
   const row = element("div", { className: "field" }, label(field), select);
   rows.set(field.name, { show: (now) => { select.value = now; showReason(row, field, now); }, row });
+  return row;
+}
+
+// A name of a catalogue, of which it suggests what begins or is called like what is typed.
+function nameRow(field) {
+  const list = element("datalist", { id: `suggested-for-${field.name}` }, ...field.suggestions.map(([value, label]) => element("option", { value, label })));
+  const box = element("input", { id: field.name, placeholder: "type to search" });
+  box.setAttribute("list", list.id);
+  box.addEventListener("change", () => change({ [field.name]: box.value.trim() }));
+  const row = element("div", { className: "field named" }, label(field), box, list);
+  const show = (now) => {
+    if (document.activeElement !== box) box.value = now ?? "";
+    row.classList.toggle("changed", now !== original(field.name));
+    showReason(row, field, now);
+  };
+  rows.set(field.name, { show, row });
   return row;
 }
 
