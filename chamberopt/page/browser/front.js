@@ -1,7 +1,7 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
 import { asLines, ask, attempt, element, onPage, unpack, warning, wordsOf } from "./state.js";
 import { followed, sinceBegin, stage } from "./steps.js";
-import { colourByState, lights, wayToTarget } from "./surfaces.js";
+import { colourByState, lights } from "./surfaces.js";
 
 const find = (id) => document.getElementById(id);
 const option = (one) => element("option", { value: [one].flat()[0], textContent: [one].flat().at(-1) }); // a text, or a pair with its words
@@ -83,7 +83,7 @@ async function drawChamber(isDraft) {
   view.lines("edges", answer.edges, seen.edges, "wall");
   const [low, high] = answer.shape_mm;
   const box = { low: low.map((x, i) => Math.min(x, answer.part_mm[0][i])), high: high.map((x, i) => Math.max(x, answer.part_mm[1][i])) };
-  lookAt(box, wayToTarget(view.get("part"), answer));
+  lookAt(box, answer.way);
   document.body.dataset.chamber = isDraft ? "draft" : "proposal";
 }
 view.renderer.domElement.addEventListener("dblclick", () => { if (view.home) view.look(view.home); });
