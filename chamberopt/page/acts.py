@@ -28,7 +28,7 @@ from chamberopt.common.files import (
 )
 from chamberopt.common.key_words import AIMS, inner_first, unit_of
 from chamberopt.common.toml_fields import read_toml
-from chamberopt.coverage.metrics import OBJECTIVES, metric_problem
+from chamberopt.coverage.metrics import OBJECTIVES, metric_names, metric_problem
 from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
 from chamberopt.documents.answer import on_average
@@ -38,7 +38,7 @@ from chamberopt.documents.proposal import matter_of
 from chamberopt.documents.report import answer_section
 from chamberopt.documents.study import aim_in_words
 from chamberopt.documents.wanted import times_longer
-from chamberopt.documents.wording import value_text
+from chamberopt.documents.wording import metric_label, value_text
 from chamberopt.page.answers import packed, part_answer, shape_answer, step_texts, surface_answer
 from chamberopt.page.checker import Checker
 from chamberopt.page.duration import duration_in_words
@@ -320,6 +320,11 @@ class Acts:
             "is_drawn": design.chamber.setup() is not None,
             "files": _files_beside(file.path),
             "aims": [(name, AIMS[name]) for name in _aims(design)],
+            "figures": [
+                (name, metric_label(name).with_unit)
+                for name in metric_names(design)
+                if "." not in name  # of the target, not of zones and steps
+            ],
         }
 
     def study(self, asked: Any) -> dict[str, object]:
@@ -338,7 +343,8 @@ class Acts:
             raise InputError(f"{aim}: nothing that a search of this design can be after")
         start = {key: f"now {file.design.value(key):g}" for key in bounds}
         asked_for = file.design, bounds, start, int(evaluations), GOALS[aim]
-        write_text(path, study_of_design(file.path.name, *asked_for))
+        limits = _limits_text(asked.get("limits", ()))
+        write_text(path, study_of_design(file.path.name, *asked_for) + limits)
         try:
             load_study(path)
         except InputError:
@@ -368,10 +374,27 @@ class Acts:
         return self._command.start(arguments, self._path.parent, shows)
 
     def duration(self, asked: Any) -> dict[str, object]:
-        """Return in words how long a design or study will take; "" if nothing is known of it."""
+        """Return in words how long a design or study will take; "" if nothing is known of it.
+
+        `searched` is the folder of a search of the study, the newest; "" if there is none.
+        """
         what = self.inside(str(asked["of"]))
         self._refuse_shape(what)
-        return {"words": duration_in_words(what, _result_folders(self._path.parent))}
+        folders = _result_folders(self._path.parent)
+        words = duration_in_words(what, folders)
+        return {"words": words, "searched": self._searched(what, folders)}
+
+    def _searched(self, file: Path, folders: Sequence[Path]) -> str:
+        """Return the first of some folders in which a study was searched; "" for a design."""
+        if not is_study(read_toml(file, "design")[1]):
+            return ""
+        study = load_study(file)
+        for folder in filter(is_study_folder, folders):
+            with suppress(InputError):
+                inputs = read_inputs(folder)
+                if inputs.plan is None and inputs.is_of(study):
+                    return folder.relative_to(self._path.parent).as_posix()
+        return ""
 
     def candidates(self, asked: Any) -> dict[str, object]:
         """Return the candidates of a study; only the version if the page has seen this one."""
@@ -596,4 +619,33 @@ def _question(tables: Mapping[str, Any]) -> dict[str, object]:
             varied = TypeAdapter(Vary).validate_python(one)
             ends |= {} if varied.texts else {name: varied.bounds}
     count = tables.get("optimizer", {}).get("evaluations")
-    return {"aim": tables.get("objective", {}).get("name"), "vary": ends, "evaluations": count}
+    limits = [
+        [name, metric_label(name).with_unit, side, metric_label(name).factor * float(one[side])]
+        for name, one in tables.get("constraints", {}).items()
+        for side in ("min", "max")
+        if side in one
+    ]
+    aim = tables.get("objective", {}).get("name")
+    return {"aim": aim, "vary": ends, "evaluations": count, "limits": limits}
+
+
+def _limits_text(limits: Sequence[Any]) -> str:
+    """Return the table of a study file with limits of figures; "" without limits.
+
+    Args:
+        limits: name of each figure, "min" or "max", and the limit in the unit of its label.
+
+    Raises InputError if a limit is no number, or is given twice.
+    """
+    import tomlkit
+
+    tables: dict[str, Any] = {}
+    for name, side, value in limits:
+        label = metric_label(str(name))
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InputError(f"limit of {label.text}: given {value!r}; give a number")
+        held = tables.setdefault(str(name), tomlkit.inline_table())
+        if side not in ("min", "max") or side in held:
+            raise InputError(f"limit of {label.text}: given twice; leave one out")
+        held[side] = float(f"{value / label.factor:.10g}")
+    return f"\n{tomlkit.dumps({'constraints': tables})}" if tables else ""
