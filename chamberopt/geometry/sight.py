@@ -40,7 +40,7 @@ def way_to_see(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) 
     turn = np.arctan2(USUAL[1], USUAL[0]) + 2.0 * np.pi * np.arange(AROUND) / AROUND
     usual = _way(turn[:1], 20.0)[0]
     if not chosen.any():
-        return usual
+        return np.asarray(usual)
     corners = vertices[triangles]
     place, normal = (
         np.concatenate(both)

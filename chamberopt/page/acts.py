@@ -32,6 +32,7 @@ from chamberopt.coverage.metrics import OBJECTIVES, metric_names, metric_problem
 from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
 from chamberopt.documents.answer import on_average
+from chamberopt.documents.comparison import after_shorter_time
 from chamberopt.documents.document import Section, Sentence
 from chamberopt.documents.overview import comparison_overview
 from chamberopt.documents.proposal import matter_of
@@ -65,7 +66,7 @@ from chamberopt.page.study_answers import candidate_answer, candidates_answer, m
 from chamberopt.printers.html import section
 from chamberopt.printers.report_page import REPORT, parts_content, viewer
 from chamberopt.printers.sheet_page import SHEET
-from chamberopt.results.compare.comparison import compare, differing_values, values_before
+from chamberopt.results.compare.comparison import compare, differing_values, labels, values_before
 from chamberopt.results.load import Result, load_result, load_start
 from chamberopt.search.study import load_study
 from chamberopt.search.study.parameters import Vary
@@ -160,7 +161,11 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
     """
     longer: dict[str, object] = {}
     html, content = parts_content(folders)
-    if len(folders) > 1:
+    if _times_differ(folders):
+        sentences = after_shorter_time([*map(load_result, folders)], labels(folders))
+        told = [Sentence(sentences[0], "sentence"), Sentence(sentences[1], "warning")]
+        first = Section("Comparison", told, is_answer=True)
+    elif len(folders) > 1:
         first = comparison_overview(compare(folders))
     else:
         result = load_result(folders[0])
@@ -173,9 +178,14 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
     html = explained(
         section(replace(first, content=answers), viewer)
         + html
-        + section(Section("In figures", figures), viewer)
+        + (section(Section("In figures", figures), viewer) if figures else "")
     )
-    return {"content": content, "html": html, "longer": longer}
+    places = len(folders) > 1 and not _times_differ(folders)  # whether these can be compared
+    return {"content": content, "html": html, "longer": longer, "places": places}
+
+
+def _times_differ(folders: Sequence[Path]) -> bool:
+    return len({load_result(one).design.process.treatment_time for one in folders}) > 1
 
 
 def difference(folders: Sequence[Path]) -> dict[str, str]:

@@ -46,7 +46,7 @@ find("show-results").addEventListener("click", () => attempt(() => show()));
 async function show() {
   const folders = ticked().reverse(); // the older first
   if (!folders.length || folders.length > 2) throw new Error("tick one result, or two to compare");
-  const { html, content, longer } = await ask("/shown", { folders });
+  const { html, content, longer, places } = await ask("/shown", { folders });
   closeResults();
   seen = folders;
   find("shown").innerHTML = html; // the server's own, as in a report; names in it are escaped
@@ -55,7 +55,7 @@ async function show() {
   if (longer.times) find("stale").after(element("p", {}, simulateLonger(longer)));
   views = showParts(content);
   await refresh();
-  if (folders.length > 1) await showDifference(folders);
+  if (places) await showDifference(folders);
 }
 
 // A button that makes the simulated time of the design longer, and leads to where it is simulated.
