@@ -47,6 +47,7 @@ async function show() {
   const folders = ticked().reverse(); // the older first
   if (!folders.length || folders.length > 2) throw new Error("tick one result, or two to compare");
   const { html, content, longer, places } = await ask("/shown", { folders });
+  if (find("results").hidden && find("study-view").hidden) return; // another tab was opened meanwhile
   closeResults();
   seen = folders;
   find("shown").innerHTML = html; // the server's own, as in a report; names in it are escaped
