@@ -51,7 +51,7 @@ def opened(folder: Path, *file: str, height: int = 820) -> Iterator[Any]:
 
 
 def study_picture(study: Path, folder: Path) -> None:
-    """The candidates of the quickstart, with the chamber of the best of its search."""
+    """The candidates of the quickstart, with the chamber of the best."""
     with TemporaryDirectory() as place:
         here = Path(place) / "gear"
         shutil.copytree("designs", here, ignore=shutil.ignore_patterns("results"))
@@ -62,14 +62,10 @@ def study_picture(study: Path, folder: Path) -> None:
             page.click("nav [data-tab=results]")
             page.click("text=see its candidates")
             page.wait_for_selector("body[data-followed]", timeout=120_000)
-            marks = page.locator("#study-of figure").first.locator(".candidate circle.target")
-            lowest = marks.evaluate_all(
-                "all => all.map(one => Number(one.getAttribute('cy'))).reduce("
-                "(best, y, k, all) => y < all[best] ? k : best, 0)"
-            )  # on the screen; the best objective
-            marks.nth(lowest).click()
+            page.click("#study-of .rows tr.best")
             page.wait_for_selector("body[data-candidate]")
             page.wait_for_selector(CHECKED, timeout=120_000)
+            page.locator("#study-view").evaluate("one => one.scrollTo(0, 0)")
             page.wait_for_timeout(1000)
             page.screenshot(path=folder / "page_study.png")
 

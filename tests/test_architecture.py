@@ -18,7 +18,7 @@ ORDER = {
         "common geometry design chamber coverage simulation peening search results pictures "
         "documents printers viewer workflows export page api cli __main__"
     ),
-    "chamberopt/geometry": "triangles faces+heights+outline+solids+remesh+thickness meshes "
+    "chamberopt/geometry": "triangles faces+heights+outline+solids+remesh+sight+thickness meshes "
     "slivers+smoothing cut",
     "chamberopt/geometry/smoothing": "rounds normals divide smooth part",
     "chamberopt/geometry/meshes": "surface_error native_reader+units+raw_mesh+self_intersection "

@@ -33,6 +33,26 @@ KINDS = {
     "block": "block on the faces, up to the wall",
     "filled": "block on the faces, up to the wall",
 }
+# Words of keys whose names say too little.
+KEYS = {
+    "holder.at": "faces of the holder",
+    "mask.at": "faces of the mask",
+    "part.rotate_deg": "pose of the part",
+    "effects.part_turn": "turning of the part",
+    "optimizer.evaluations": "chambers to simulate",
+    "objective_half_width": "half-width of the objective",
+    "tensile_MPa": "tensile strength",
+    "slope_deg": "slope of the faces",
+    "tungsten_carbide": "tungsten carbide",
+}
+TABLES = (
+    "part|chamber|shot|sonotrode|sonotrodes|materials|effects|process|holder|mask|zones|"
+    "tolerances|ranges|optimizer"
+)
+DOTTED = rf"(?:vary\.)?(?:{TABLES})(?:\.\w+)+"
+BARE = "|".join(key for key in KEYS if "." not in key)
+# A key or a table of a file in a text, in the patterns of the texts that have them.
+KEY = rf"\[(?:{TABLES})\]|\[{DOTTED}\]|(?<![\w./])(?:{DOTTED}|(?:{BARE})\b)"
 _ITEM = re.compile(r"\.([012])$")
 _UNIT = re.compile(rf"_({'|'.join(sorted(UNITS, key=len, reverse=True))})$")
 _ALONG = re.compile(r"(?:deg|mm|axis)\.([012])$")  # along x, y and z
@@ -88,3 +108,14 @@ def inner_first(name: str) -> str:
     """
     steps = reversed(name.split("."))
     return " of the ".join(str(int(s) + 1) if s.isdecimal() else in_words(s) for s in steps)
+
+
+def key_in_words(key: str) -> str:
+    """Return a key or table as it stands in a text in words.
+
+    >>> key_in_words("[vary.chamber.height_mm]")
+    'height of the chamber'
+    """
+    name = key.strip("[]").removeprefix("vary.")
+    effect = name.removeprefix("effects.")
+    return KEYS.get(name) or KEYS.get(effect) or inner_first(effect)

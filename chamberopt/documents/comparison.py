@@ -7,14 +7,16 @@ than noise.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from chamberopt.common.estimate import CONFIDENCE, Estimate
 from chamberopt.common.number_text import estimate_text
 from chamberopt.documents.coverage import labels_of, main_names
 from chamberopt.documents.document import Table
-from chamberopt.documents.wording import Label
-from chamberopt.results.compare.comparison import Comparison
+from chamberopt.documents.wording import Label, metric_label, plain
+from chamberopt.results.compare.comparison import Comparison, coverage_after, require_comparable
 from chamberopt.results.compare.difference import MAX_TIME_RATIO, Difference
+from chamberopt.results.load import Result
 
 HEADER = ("difference", "real", "to know: simulate")
 MARK = " *"  # of a difference that is more than noise
@@ -58,23 +60,74 @@ def summary(comparison: Comparison) -> list[Table | str]:
 
 
 def _sentence(comparison: Comparison, name: str, label: Label, k: int) -> str:
-    """Return in one sentence how a later candidate compares with the first one in a figure.
+    """Return in one sentence which is better, a later candidate or the first, and by how much.
 
     Args:
-        name, label: of the figure.
+        name, label: of the figure, which is better the larger its stored value is.
         k: place of the candidate among the later ones.
     """
-    first, later = comparison.labels[0], comparison.labels[1 + k]
+    names = comparison.labels[0], comparison.labels[1 + k]
     before, after = (comparison.metrics[name][one] for one in (0, 1 + k))
-    gap = comparison.differences[name][k]
+    return _which_is_better(names, label, (before, after), comparison.differences[name][k])
+
+
+def _which_is_better(
+    names: tuple[str, str], label: Label, values: tuple[Estimate, Estimate], gap: Difference
+) -> str:
+    """Return in one sentence which of two is better in a figure, and by how much.
+
+    Args:
+        names, values: of the first and the later one.
+        label: of the figure.
+        gap: the later value minus the first.
+    """
+    (first, later), (before, after) = names, values
     if not (before.has_number and after.has_number) or gap.in_words:
-        return f"Whether the {label.text} of {later} and {first} differs is not resolved."
-    values = f"the {label.text} is {label.format(after)}, that of {first} {label.format(before)}"
+        return (
+            f"No difference is resolved between {later} and {first}: too few dents were simulated "
+            f"to tell the {label.text} of both."
+        )
     if gap.value == 0.0 and gap.half_width == 0.0:
-        return f"{later}: {values}: no difference."
+        return f"{later} is like {first}: the {label.text} of both is {label.format(after)}."
     change = label.format(gap.estimate, sign=True)
-    noise = "more than noise" if gap.real else "within the noise"
-    return f"{later}: {values}: a difference of {change}, {noise}."
+    if not gap.real:
+        both = f"{label.format(after)} against {label.format(before)}; 95 % intervals"
+        return (
+            f"No difference is resolved between {later} and {first}: {change} in the {label.text} "
+            f"is within the noise ({both})."
+        )
+    better, other, high, low = (later, first, after, before)
+    if gap.value < 0.0:
+        better, other, high, low = (first, later, before, after)
+    side = "higher" if label.factor > 0.0 else "lower"
+    return (
+        f"{better} is better than {other}: the {label.text} is {side} by {change.lstrip('+−')} "
+        f"({label.format(high)} against {label.format(low)}; 95 % intervals)."
+    )
+
+
+def after_shorter_time(results: Sequence[Result], names: Sequence[str]) -> list[str]:
+    """Return sentences on two results of different treatment times: what can be compared of them.
+
+    Raises InputError if their parts, targets, windows or calibrations differ.
+    """
+    require_comparable(results)
+    seconds = min(one.design.process.treatment_time for one in results)
+    before, after = (coverage_after(one, seconds) for one in results)
+    label, both = metric_label("mean_coverage"), (names[0], names[1])
+    if before is None or after is None:
+        text = f"Too few dents were simulated to compare {both[1]} and {both[0]}."
+    else:
+        half_width = math.hypot(before.half_width, after.half_width)
+        gap = Difference(after.value - before.value, half_width, paired=False)
+        text = _which_is_better(both, label, (before, after), gap)
+    times = " and ".join(plain(one.design.process.treatment_time) for one in results)
+    return [
+        f"{text[:-1]} after {plain(seconds)} s, the shorter of both treatment times.",
+        f"They were peened for {times} s. The maps show both after one time, which the slider "
+        "sets. To compare all figures, and the coverage place by place, give one the treatment "
+        "time of the other, in the tab Numbers, and simulate it again.",
+    ]
 
 
 def comparison_lines(comparison: Comparison) -> list[Table | str]:

@@ -104,8 +104,10 @@ def sweep_overview(sweep: SweepResult) -> Section:
 
 def comparison_overview(comparison: Comparison) -> Section:
     """Return the overview of a comparison: a sentence for each candidate, and the main figures."""
-    title = f"Comparison with {comparison.labels[0]}"
-    return Section(title, _blocks(summary(comparison)))
+    title, lines = f"Comparison with {comparison.labels[0]}", summary(comparison)
+    end = lines.index("")
+    answers = [Sentence(str(one), "sentence") for one in lines[:end]]
+    return Section(title, [*answers, *_blocks(lines[end:])], is_answer=True)
 
 
 def _blocks(lines: Sequence[Table | str]) -> list[Block]:

@@ -34,7 +34,13 @@ from chamberopt.documents.study import (
     search_section,
 )
 from chamberopt.documents.tolerances import tolerance_section
-from chamberopt.documents.wording import metric_label, objective_label, plain, value_text
+from chamberopt.documents.wording import (
+    keys_in_words,
+    metric_label,
+    objective_label,
+    plain,
+    value_text,
+)
 from chamberopt.documents.zones import steps_section, zones_section
 from chamberopt.pictures.part3d import part_scene
 from chamberopt.results.load import START, load_start, load_trials
@@ -289,7 +295,7 @@ def _effect_text(name: str, value: object) -> str:
 def _to_settle(result: Result) -> Section | None:
     """Return what is to be settled with the design before its chamber is built, if anything is."""
     found = map(matter_of, result.design.to_settle)
-    texts = [f"{one.mark.capitalize()}{one.text}" for one in found]
+    texts = [keys_in_words(f"{one.mark.capitalize()}{one.text}") for one in found]
     return Section("To be settled before it is built", [Items(texts)]) if texts else None
 
 
@@ -297,6 +303,7 @@ def _notes(result: Result) -> Section:
     warnings, settled = result.record.warnings, {*matters(result.design)}
     told = (text for text in warnings or () if text not in settled)  # those have their own section
     notes = [*(f"Warning: {text}" for text in told), *notes_of(result)]
+    notes = [keys_in_words(text) for text in notes]
     content = [Sentence(note, "warning") for note in notes]
     if warnings is None:
         text = "The design was not checked; “chamberopt check” lists its warnings."

@@ -11,7 +11,7 @@ import numpy as np
 
 from chamberopt.chamber.fixture import size_in_words
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.key_words import in_words, title_with_unit, unit_of
+from chamberopt.common.key_words import in_words, key_in_words, title_with_unit, unit_of
 from chamberopt.common.number_text import estimate_text, percent
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.calibration import why_no_intensity
@@ -23,11 +23,11 @@ from chamberopt.documents.answer import answer, answer_lines
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.ranges import time_at_slow_end
-from chamberopt.documents.report import limits_of_intervals, notes_of
+from chamberopt.documents.report import limits_of_intervals
 from chamberopt.documents.study import exposed_target
 from chamberopt.documents.tolerances import sheet_rows
 from chamberopt.documents.wanted import intensity_lines, time_lines, wanted_rows
-from chamberopt.documents.wording import metric_label, plain, value_text
+from chamberopt.documents.wording import keys_in_words, metric_label, plain, value_text
 from chamberopt.documents.zones import turned
 from chamberopt.results.load import load_start
 
@@ -125,10 +125,11 @@ def cautions(result: Result) -> Iterator[str]:
             "coverage and times are those of the facets."
         )
     if result.record.chamber.pieces_in_air:
-        yield "The part is held in the air: nothing holds it, [holder] of the design would."
+        yield "The part is held in the air: nothing holds it, a holder of the design would."
     if ends := result.study.on_bounds if result.study else []:
         yield (
-            f"The search ended on its bounds of {', '.join(ends)}: a better chamber may lie beyond."
+            f"The search ended on its bounds of {', '.join(map(key_in_words, ends))}: a better "
+            "chamber may lie beyond."
         )
 
 
@@ -496,7 +497,7 @@ def _tolerances(result: Result) -> Iterator[Row]:
     if result.design.tolerances is None:
         low, high = (_peak_to_valley(result) + sign * USUAL["amplitude_pv_um"] for sign in (-1, 1))
         usual = f"{plain(low)} to {plain(high)} µm, {USUAL_IN_WORDS}"
-        yield "", f"Amplitude: {usual}. The design has no [tolerances]: others are not known."
+        yield "", f"Amplitude: {usual}. The design states no tolerances: others are not known."
     elif found is None:
         yield "", "What they cost was not simulated."
     else:
@@ -509,9 +510,7 @@ def _warnings(result: Result) -> Iterator[Row]:
         yield "", "The design was not checked, so that its warnings are not known."
     elif not warnings:
         yield "", "There are none."
-    yield from (("", text) for text in warnings or ())
-    if notes_of(result):
-        yield "", f"Notes in the report: {len(notes_of(result))}."
+    yield from (("", keys_in_words(text)) for text in warnings or ())
 
 
 def _identity(result: Result) -> Iterator[Row]:

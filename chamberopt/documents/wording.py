@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 from chamberopt.common import number_text
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
+from chamberopt.common.key_words import KEY, key_in_words
 from chamberopt.common.number_text import estimate_text
 from chamberopt.coverage.metrics import (
     OBJECTIVES,
@@ -20,9 +22,13 @@ from chamberopt.coverage.metrics import (
     parse_objective,
 )
 from chamberopt.documents.document import Table
+from chamberopt.geometry.meshes.formats import SUFFIXES
 
 if TYPE_CHECKING:
     from chamberopt.results.impact_energy import ImpactEnergy
+
+FILES = (".toml", ".json", ".html", ".pdf", ".png", *SUFFIXES)  # "part.stl" is no key
+_KEY = re.compile(KEY)
 
 
 @dataclass(frozen=True)
@@ -161,6 +167,17 @@ def with_interval(value: float, half_width: float, unit: str = "", sign: bool = 
 def per_cent(value: float) -> str:
     """Return a share from 0 to 1 as text in whole per cent."""
     return f"{100.0 * value:.0f} %"
+
+
+def keys_in_words(text: str) -> str:
+    """Return a text with words in the place of keys of files, for readers who edit no file.
+
+    >>> keys_in_words("raise process.accuracy.simulated_time_s of part.stl")
+    'raise simulated time of the accuracy of the process of part.stl'
+    """
+    return _KEY.sub(
+        lambda found: found[0] if found[0].lower().endswith(FILES) else key_in_words(found[0]), text
+    )
 
 
 def energy_lines(found: ImpactEnergy) -> list[Table | str]:

@@ -6,6 +6,7 @@ import re
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import count, product
 from pathlib import Path
 from typing import Any
@@ -27,16 +28,18 @@ from chamberopt.common.files import (
 )
 from chamberopt.common.key_words import AIMS, inner_first, unit_of
 from chamberopt.common.toml_fields import read_toml
-from chamberopt.coverage.metrics import OBJECTIVES, metric_problem
+from chamberopt.coverage.metrics import OBJECTIVES, metric_names, metric_problem
 from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
 from chamberopt.documents.answer import on_average
+from chamberopt.documents.comparison import after_shorter_time
+from chamberopt.documents.document import Section, Sentence
 from chamberopt.documents.overview import comparison_overview
 from chamberopt.documents.proposal import matter_of
 from chamberopt.documents.report import answer_section
 from chamberopt.documents.study import aim_in_words
 from chamberopt.documents.wanted import times_longer
-from chamberopt.documents.wording import value_text
+from chamberopt.documents.wording import metric_label, value_text
 from chamberopt.page.answers import packed, part_answer, shape_answer, step_texts, surface_answer
 from chamberopt.page.checker import Checker
 from chamberopt.page.duration import duration_in_words
@@ -63,7 +66,7 @@ from chamberopt.page.study_answers import candidate_answer, candidates_answer, m
 from chamberopt.printers.html import section
 from chamberopt.printers.report_page import REPORT, parts_content, viewer
 from chamberopt.printers.sheet_page import SHEET
-from chamberopt.results.compare.comparison import compare, differing_values, values_before
+from chamberopt.results.compare.comparison import compare, differing_values, labels, values_before
 from chamberopt.results.load import Result, load_result, load_start
 from chamberopt.search.study import load_study
 from chamberopt.search.study.parameters import Vary
@@ -148,6 +151,8 @@ def _stale(result: Result, now: Design) -> str:
 def shown(folders: Sequence[Path]) -> dict[str, object]:
     """Return the 3D view of results side by side, with the answer of one or the comparison of two.
 
+    What is answered stands above the view, and its figures below.
+
     Where one does not tell the peening strength, `longer` has how many times as long a simulation
     tells it, and this time as values of the design.
 
@@ -156,7 +161,11 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
     """
     longer: dict[str, object] = {}
     html, content = parts_content(folders)
-    if len(folders) > 1:
+    if _times_differ(folders):
+        sentences = after_shorter_time([*map(load_result, folders)], labels(folders))
+        told = [Sentence(sentences[0], "sentence"), Sentence(sentences[1], "warning")]
+        first = Section("Comparison", told, is_answer=True)
+    elif len(folders) > 1:
         first = comparison_overview(compare(folders))
     else:
         result = load_result(folders[0])
@@ -164,8 +173,19 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
         if (times := times_longer(result)) > 1:
             now = result.design.process.accuracy.simulated_time_s
             longer = {"times": times, "values": {SIMULATED_TIME: float(f"{times * now:.4g}")}}
-    html = explained(section(first, viewer) + html)
-    return {"content": content, "html": html, "longer": longer}
+    answers = [one for one in first.content if isinstance(one, Sentence) and one.kind in ANSWERS]
+    figures = [one for one in first.content if one not in answers]
+    html = explained(
+        section(replace(first, content=answers), viewer)
+        + html
+        + (section(Section("In figures", figures), viewer) if figures else "")
+    )
+    places = len(folders) > 1 and not _times_differ(folders)  # whether these can be compared
+    return {"content": content, "html": html, "longer": longer, "places": places}
+
+
+def _times_differ(folders: Sequence[Path]) -> bool:
+    return len({load_result(one).design.process.treatment_time for one in folders}) > 1
 
 
 def difference(folders: Sequence[Path]) -> dict[str, str]:
@@ -181,6 +201,7 @@ def difference(folders: Sequence[Path]) -> dict[str, str]:
         return {"picture": f"data:image/png;base64,{b64encode(read_file(picture)).decode()}"}
 
 
+ANSWERS = "sentence", "warning"  # kinds of sentences that stand above the view of a result
 SIMULATED_TIME = "process.accuracy.simulated_time_s"
 MOST_FILES = 20  # versions of the design's text that are kept for the pages that read them
 STUDY_NAME = re.compile(r"\w[\w .+-]{0,100}\.toml")
@@ -305,9 +326,15 @@ class Acts:
             "folder": str(file.folder),
             **_told_of(file),
             "chosen": {name: _chosen(design, name) for name in picked_surfaces(design)},
+            "is_proposed": file.is_proposed,
             "is_drawn": design.chamber.setup() is not None,
             "files": _files_beside(file.path),
             "aims": [(name, AIMS[name]) for name in _aims(design)],
+            "figures": [
+                (name, metric_label(name).with_unit)
+                for name in metric_names(design)
+                if "." not in name  # of the target, not of zones and steps
+            ],
         }
 
     def study(self, asked: Any) -> dict[str, object]:
@@ -326,7 +353,8 @@ class Acts:
             raise InputError(f"{aim}: nothing that a search of this design can be after")
         start = {key: f"now {file.design.value(key):g}" for key in bounds}
         asked_for = file.design, bounds, start, int(evaluations), GOALS[aim]
-        write_text(path, study_of_design(file.path.name, *asked_for))
+        limits = _limits_text(asked.get("limits", ()))
+        write_text(path, study_of_design(file.path.name, *asked_for) + limits)
         try:
             load_study(path)
         except InputError:
@@ -356,10 +384,27 @@ class Acts:
         return self._command.start(arguments, self._path.parent, shows)
 
     def duration(self, asked: Any) -> dict[str, object]:
-        """Return in words how long a design or study will take; "" if nothing is known of it."""
+        """Return in words how long a design or study will take; "" if nothing is known of it.
+
+        `searched` is the folder of a search of the study, the newest; "" if there is none.
+        """
         what = self.inside(str(asked["of"]))
         self._refuse_shape(what)
-        return {"words": duration_in_words(what, _result_folders(self._path.parent))}
+        folders = _result_folders(self._path.parent)
+        words = duration_in_words(what, folders)
+        return {"words": words, "searched": self._searched(what, folders)}
+
+    def _searched(self, file: Path, folders: Sequence[Path]) -> str:
+        """Return the first of some folders in which a study was searched; "" for a design."""
+        if not is_study(read_toml(file, "design")[1]):
+            return ""
+        study = load_study(file)
+        for folder in filter(is_study_folder, folders):
+            with suppress(InputError):
+                inputs = read_inputs(folder)
+                if inputs.plan is None and inputs.is_of(study):
+                    return folder.relative_to(self._path.parent).as_posix()
+        return ""
 
     def candidates(self, asked: Any) -> dict[str, object]:
         """Return the candidates of a study; only the version if the page has seen this one."""
@@ -584,4 +629,33 @@ def _question(tables: Mapping[str, Any]) -> dict[str, object]:
             varied = TypeAdapter(Vary).validate_python(one)
             ends |= {} if varied.texts else {name: varied.bounds}
     count = tables.get("optimizer", {}).get("evaluations")
-    return {"aim": tables.get("objective", {}).get("name"), "vary": ends, "evaluations": count}
+    limits = [
+        [name, metric_label(name).with_unit, side, metric_label(name).factor * float(one[side])]
+        for name, one in tables.get("constraints", {}).items()
+        for side in ("min", "max")
+        if side in one
+    ]
+    aim = tables.get("objective", {}).get("name")
+    return {"aim": aim, "vary": ends, "evaluations": count, "limits": limits}
+
+
+def _limits_text(limits: Sequence[Any]) -> str:
+    """Return the table of a study file with limits of figures; "" without limits.
+
+    Args:
+        limits: name of each figure, "min" or "max", and the limit in the unit of its label.
+
+    Raises InputError if a limit is no number, or is given twice.
+    """
+    import tomlkit
+
+    tables: dict[str, Any] = {}
+    for name, side, value in limits:
+        label = metric_label(str(name))
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InputError(f"limit of {label.text}: given {value!r}; give a number")
+        held = tables.setdefault(str(name), tomlkit.inline_table())
+        if side not in ("min", "max") or side in held:
+            raise InputError(f"limit of {label.text}: given twice; leave one out")
+        held[side] = float(f"{value / label.factor:.10g}")
+    return f"\n{tomlkit.dumps({'constraints': tables})}" if tables else ""

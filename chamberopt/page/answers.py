@@ -29,6 +29,7 @@ from chamberopt.design.part import Selection
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.documents.facts import facts_in_words
 from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.sight import way_to_see
 from chamberopt.geometry.triangles import border_edges, sharp_edges
 from chamberopt.page.page_words import Words, on_page
 from chamberopt.pictures.charts.colours import EDGES, GREEN, KINDS
@@ -114,12 +115,26 @@ def shape_answer(design: Design, step: int = 0) -> bytes:
         "shift": (1e3 * part.shift).tolist(),
         "shape_mm": [(1e3 * low).tolist(), (1e3 * high).tolist()],
         "part_mm": [(1e3 * own.min(axis=0)).tolist(), (1e3 * own.max(axis=0)).tolist()],
+        "way": _way(part.mesh, part.rotation.tobytes(), part.target.tobytes()),
         "target_triangles": int(part.target.sum()),
         "balls": design.shot.count,
         "zones": [*part.zones],  # zone k + 1 has name k
     }
     surface = _surface(shape.vertices, shape.triangles, shape.tags)
     return packed(head, **surface, state=state, zone=zone)
+
+
+@lru_cache(maxsize=8)
+def _way(mesh: PartMesh, rotation: bytes, target: bytes) -> list[float]:
+    """Return the unit vector to the eye that sees most of a target, as of `way_to_see`.
+
+    Args:
+        rotation: from the part's frame to that of the chamber, (3, 3), as bytes.
+        target: marks the target's triangles, (m,) bool, as bytes.
+    """
+    turned = mesh.vertices @ np.frombuffer(rotation).reshape(3, 3).T
+    chosen = np.frombuffer(target, dtype=bool)
+    return [float(one) for one in way_to_see(turned, mesh.triangles, chosen)]
 
 
 def check_answers(design: Design, step: int = 0) -> Iterator[bytes]:

@@ -22,7 +22,7 @@ from chamberopt.common.toml_errors import text_choices
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design, validate
 from chamberopt.design.fixture import HOLDER_KEYS, Holder
-from chamberopt.design.materials import BY_NAME
+from chamberopt.design.materials import BY_NAME, SURFACES, alloys
 from chamberopt.design.shapes.base import is_custom
 from chamberopt.page.page_words import choices, on_page
 from chamberopt.page.structure import (
@@ -43,6 +43,9 @@ Changes = Mapping[str, Any]
 LONGEST_SAVE_S = 5.0  # wait for another page's save, which takes a tenth of a second
 LATE_WRITE_S = 0.05  # an editor takes far less from opening a file to writing it
 FACETS, ACCURACY = "chamber.facets", "process.accuracy"  # a number, and where it is shown
+# A proposed design begins with this; the comment behind each number is then the reason for it.
+PROPOSED = "proposed by `chamberopt new`"
+CHANGED = "changed by you; proposed was "  # and the value, before the reason behind that
 TO_SETTLE = "to_settle"  # from which the page takes out what is settled
 # Keys that the page changes beside its fields: zones, and the faces of target, zone or fixture.
 PICKED = re.compile(
@@ -106,7 +109,8 @@ class EditedFile:
     def changed_text(self, changes: Changes) -> str:
         """Return the text of the file with some values changed.
 
-        Comments, order and other lines stay. `changes` has new values by dotted name.
+        Comments, order and other lines stay, but that the reason behind a proposed number says of
+        what number it was. `changes` has new values by dotted name.
 
         Raises:
             InputError: the page may not change a key, or the key stands in the file in a form that
@@ -118,7 +122,7 @@ class EditedFile:
         if KEPT in changes:
             others = {name: value for name, value in changes.items() if name != KEPT}
             return self.with_steps(changes[KEPT]).changed_text(others)
-        document, known = tomlkit.parse(self.text), field_names(self.design)
+        document, known = tomlkit.parse(self.text), {*field_names(self.design), *self.alloys()}
         # What is taken out goes first: it may be chosen anew after that.
         for name, value in sorted(changes.items(), key=lambda one: one[1] not in (None, "")):
             is_own = name in known or PICKED.fullmatch(name)
@@ -136,7 +140,15 @@ class EditedFile:
                     f"{name}: the page cannot change it where the file says it ({error}); write "
                     "its table with a header of its own, as [part.target]"
                 ) from None
+        if self.is_proposed:
+            for name in changes.keys() & known:
+                _keep_reason_true(tomlkit.parse(self.text), document, name)
         return tomlkit.dumps(document) if changes else self.text
+
+    @property
+    def is_proposed(self) -> bool:
+        """True if the comments in the file are reasons of the values that were proposed."""
+        return PROPOSED in self.text.partition("\n")[0]
 
     def with_steps(self, kept: Sequence[int]) -> EditedFile:
         """Return the file as it would be with some of its steps alone.
@@ -189,6 +201,16 @@ class EditedFile:
                 f"{self.path.name}: changed on disk since this page read it, so it is not "
                 "replaced; reload the page to go on from what it says now"
             )
+
+    def alloys(self) -> dict[str, str]:
+        """Return the names of alloys that the file gives, by the dotted names of their keys."""
+        found, tables = {}, tomllib.loads(self.text).get("materials", {})
+        for name, given in tables.items() if isinstance(tables, dict) else ():
+            if name in SURFACES and isinstance(given, str):
+                found[f"materials.{name}"] = given
+            elif name in SURFACES and isinstance(given, dict) and "alloy" in given:
+                found[f"materials.{name}.alloy"] = str(given["alloy"])
+        return found
 
     def is_fixed(self, name: str) -> bool:
         """Return True if a number cannot be edited because its table is given by a name.
@@ -255,6 +277,33 @@ class EditedFile:
         return value
 
 
+def _keep_reason_true(before: Any, after: Any, name: str) -> None:
+    """Let the comment behind a changed value say which value it was the reason of.
+
+    Args:
+        before, after: the parsed file as it is and as it would be.
+        name: dotted name of the value; of an item of a list, the reason is behind the list.
+    """
+    steps = [step for step in name.split(".") if not step.isdecimal()]
+    for step in steps:
+        before, after = (
+            one.get(step) if isinstance(one, Mapping) else None for one in (before, after)
+        )
+    if before is None or after is None or not before.trivia.comment:
+        return
+    reason = before.trivia.comment.lstrip("#").strip()
+    proposed = before.as_string()
+    if reason.startswith(CHANGED):
+        proposed, _, reason = reason.removeprefix(CHANGED).partition(": ")
+    is_back = after.as_string() == proposed
+    after.trivia.comment = f"# {reason}" if is_back else f"# {CHANGED}{proposed}: {reason}"
+
+
+def alloy_suggestions() -> list[tuple[str, str]]:
+    """Return the name of each alloy of the catalogue, and what metal it is."""
+    return [(one.name, one.metal) for one in alloys()]
+
+
 def custom_shape(data: Mapping[str, object]) -> str:
     """Return the Python file that a design names as its chamber's shape, or "" for other shapes.
 
@@ -314,7 +363,19 @@ def design_fields(file: EditedFile) -> list[dict[str, object]]:
     design, varied = file.design, set(file.design.numbers())
     reasons = comments(file.text)
     rows: list[dict[str, Any]] = []
+    named = [
+        {
+            "name": name,
+            "value": value,
+            "suggestions": alloy_suggestions(),
+            "text": f"alloy of the {name.split('.')[1]}",
+            "reason": reasons.get(name, ""),
+        }
+        for name, value in file.alloys().items()
+    ]
     for name, field in _numbers(design):
+        if name.startswith("materials."):  # the alloys stand before their numbers
+            rows, named = rows + named, []
         row: dict[str, Any] = {"name": name, "value": _value(design, name), **_bounds(field)}
         extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
         unit = extra.get("unit", "") or unit_of(name)

@@ -28,6 +28,7 @@ from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import METRES_PER, STATED, UnknownUnitError
 from chamberopt.page.acts import Acts, free_folder, path_inside
 from chamberopt.page.answers import part_answer, shape_answer, surface_answer
+from chamberopt.page.edited_file import alloy_suggestions
 from chamberopt.page.page_words import balls_named, choices, on_page
 from chamberopt.page.started_commands import JSON, OneCommand
 from chamberopt.workflows.propose import DESIGN, PICTURE, Wishes
@@ -107,7 +108,7 @@ class Front:
             "designs": [name for name, kind in tables if kind == "design"],
             "shops": [name for name, kind in tables if kind == "shop"],
             "calibrations": [name for name, kind in tables if kind == "calibration"],
-            "alloys": [(one.name, one.metal) for one in alloys()],
+            "alloys": alloy_suggestions(),
             "balls": choices([one.name for one in balls()]),
             "shapes": choices(SHAPES),
         }

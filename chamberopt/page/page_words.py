@@ -9,8 +9,8 @@ from __future__ import annotations
 import re
 from html import escape
 
-from chamberopt.common.key_words import KINDS, inner_first
-from chamberopt.geometry.meshes.formats import SUFFIXES
+from chamberopt.common.key_words import KEY, KINDS, key_in_words
+from chamberopt.documents.wording import FILES
 
 Words = list[str | tuple[str, str]]
 
@@ -32,15 +32,6 @@ OPTIONS = {
     "pose": "pose of the part",
     "calibration": "calibration of the machine",
     "no-pilot": "the choice not to simulate",
-}
-KEYS = {
-    "holder.at": "faces of the holder",
-    "mask.at": "faces of the mask",
-    "optimizer.evaluations": "chambers to simulate",
-    "objective_half_width": "half-width of the objective",
-    "tensile_MPa": "tensile strength",
-    "slope_deg": "slope of the faces",
-    "tungsten_carbide": "tungsten carbide",
 }
 # What the page has in the place of a command, or what the command is for where the page lacks it.
 COMMANDS = {
@@ -83,20 +74,11 @@ TERMS = {
     "which on the metal yields",
     "most_even": "the study of the most even coverage, the largest mean less its spread",
 }
-_TABLES = (
-    "part|chamber|shot|sonotrode|sonotrodes|materials|effects|process|holder|mask|zones|"
-    "tolerances|ranges|optimizer"
-)
-_DOTTED = rf"(?:vary\.)?(?:{_TABLES})(?:\.\w+)+"
 _GUIDE = r"docs/[\w/]+\.md(?:#[\w-]+)?"
-_BARE = "|".join(key for key in KEYS if "." not in key)
 _COMMAND = "|".join(sorted(map(re.escape, COMMANDS), key=len, reverse=True))
-_KEY = re.compile(
-    rf"{_GUIDE}|(?:{_COMMAND})(?![\w-])|\[(?:{_TABLES})\]|\[{_DOTTED}\]|(?<![\w./])(?:{_DOTTED}|(?:{_BARE})\b)|--(?:{'|'.join(OPTIONS)})(?![\w-])"
-)
+_KEY = re.compile(rf"{_GUIDE}|(?:{_COMMAND})(?![\w-])|{KEY}|--(?:{'|'.join(OPTIONS)})(?![\w-])")
 _TERM = re.compile(rf"(?<![\w./])(?:{'|'.join(map(re.escape, TERMS))})(?![\w./])")
 _PLACE = re.compile(r"(?m)^\S*\.toml:\d+: ")  # of a line in a file, which the page does not show
-_FILES = (".toml", ".json", ".html", ".pdf", ".png", *SUFFIXES)  # "part.stl" is no key
 
 
 def on_page(text: str, known: set[str] | None = None) -> Words:
@@ -125,10 +107,9 @@ def on_page(text: str, known: set[str] | None = None) -> Words:
             made.append((found, TERMS[found]))
             at = match.end()
             continue
-        if found.lower().endswith(_FILES):
+        if found.lower().endswith(FILES):
             continue
-        key = found.strip("[]").removeprefix("vary.").removeprefix("effects.")
-        words = COMMANDS.get(found) or OPTIONS.get(found[2:]) or KEYS.get(key) or inner_first(key)
+        words = COMMANDS.get(found) or OPTIONS.get(found[2:]) or key_in_words(found)
         words = "guide" if found.startswith("docs/") else words
         made += [text[at : match.start()]] * (match.start() > at)
         made.append((words, found))

@@ -59,7 +59,11 @@ def _difference_surface(first: Path, columns: Columns) -> Surface:
 
 
 def draw_difference(
-    first: Path, columns: Columns, titles: Sequence[str], picture: str | Path
+    first: Path,
+    columns: Columns,
+    titles: Sequence[str],
+    picture: str | Path,
+    one_below_other: bool = False,
 ) -> str | None:
     """Draw where later candidates cover more or less than the first, all on one colour scale.
 
@@ -67,11 +71,13 @@ def draw_difference(
         first: the first candidate's results folder.
         titles: a title for each later candidate.
         picture: file to write, .png.
+        one_below_other: whether the views of a candidate are one below the other, so that each is
+            as wide as the picture.
 
     Returns:
         None, or one line that says why there is no picture.
     """
-    job = {"first": first, "columns": columns, "titles": list(titles)}
+    job = {"first": first, "columns": columns, "titles": list(titles), "below": one_below_other}
     return draw_in_subprocess(render_difference, job, picture)
 
 
@@ -101,7 +107,11 @@ def render_difference(job: dict[str, Any]) -> None:
         def add(plotter: Any, k: int = k) -> None:
             _add_difference(plotter, target, rest, k, limit)
 
-        rows.append(Row(title, near_panels(add, target, surface, views)))
+        panels = near_panels(add, target, surface, views)
+        if job["below"]:
+            rows += [Row(title if one is panels[0] else "", [one]) for one in panels]
+        else:
+            rows.append(Row(title, panels))
         drawn.append(k)
     legend = [(PALE, "within the noise"), (NO_TARGET, "not in the target")]
     if not all((np.asarray(target[f"told_{k}"])[used] > 0).all() for k in drawn):

@@ -16,6 +16,7 @@ import numpy as np
 
 from chamberopt.chamber.bores_and_deflectors import on_deflectors
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
+from chamberopt.geometry.sight import way_to_see
 from chamberopt.geometry.triangles import border_edges
 from chamberopt.pictures.charts.colours import EDGES
 from chamberopt.pictures.drawn_part import DrawnPart, colour_range, point_areas
@@ -26,8 +27,7 @@ from chamberopt.results.vtp_files import MM, ZONE, Surface, fixture_marks
 
 # A triangle takes about 80 bytes of the page. Up to this number the page stays below 60 MB.
 MAX_TRIANGLES = 600_000
-USUAL = np.array([0.55, -0.9, 0.62])  # direction to the camera from the middle of the cavity
-DISTANCE = 1.8  # distance of the camera, in lengths of the cavity's diagonal
+DISTANCE = 2.2  # distance of the camera, in lengths of the cavity's diagonal
 EDGE_ANGLE = 30.0  # degrees; sharper edges of the chamber are drawn
 SATURATED = 95.0  # %; where nearly all of the target has more, coverage tells no places apart
 
@@ -90,7 +90,10 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
     on_deflector = np.zeros(chamber.n_cells, dtype=bool)
     if fitting is not None:
         on_deflector = on_deflectors(result.design, fitting)
-    eye = _eye(np.asarray(whole.face_normals) * np.asarray(whole["area"])[:, None])
+    drawn = arrays.chamber.part
+    eye = way_to_see(
+        drawn.vertices, drawn.triangles, drawn.target & (arrays.chamber.exposed_area > 0.0)
+    )
     # The part's triangle around each point, and the values of each triangle.
     triangles, row = np.unique(target["triangle"], return_inverse=True)
     of_point = np.zeros(target.n_points, dtype=int)
@@ -191,28 +194,6 @@ def _surfaces(
 
 def _shape(points: np.ndarray, triangles: np.ndarray) -> dict[str, object]:
     return {"points": _packed(points), "triangles": _packed(triangles, "<i4")}
-
-
-def _eye(normal: np.ndarray) -> np.ndarray:
-    """Return the direction to the camera: where most of the target faces, turned a little aside.
-
-    The camera is above, where the border of the chamber hides least, unless twice as much of the
-    target faces down. If all sides show about the same area, as on a gear, the direction is USUAL.
-
-    Args:
-        normal: normals of the target's triangles, as long as the triangles are large, (k, 3).
-    """
-    turn = np.arctan2(USUAL[1], USUAL[0]) + np.radians(np.arange(0.0, 360.0, 30.0))
-    around = np.hypot(*USUAL[:2]) * np.column_stack([np.cos(turn), np.sin(turn)])
-    best, seen = {}, {}
-    for height in (USUAL[2], -USUAL[2]):
-        ways = np.column_stack([around, np.full(len(turn), height)])
-        faces = np.maximum(normal @ ways.T, 0.0).sum(axis=0)
-        k = 0 if faces[0] > 0.9 * faces.max() else int(faces.argmax())
-        best[height], seen[height] = ways[k], faces[k]
-    eye = best[-USUAL[2] if seen[-USUAL[2]] > 2.0 * seen[USUAL[2]] else USUAL[2]]
-    aside = 1.1 * eye[:2] + 0.5 * USUAL[:2]
-    return np.asarray(np.r_[aside * np.hypot(*USUAL[:2]) / np.hypot(*aside), eye[2]])
 
 
 def _view(chamber: Surface, eye: np.ndarray) -> dict[str, object]:

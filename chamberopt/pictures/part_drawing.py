@@ -173,18 +173,11 @@ def draw_chamber(
         face: on which the chamber stands, whose joints the plan shows, and its rim where it is
             larger than the floor.
     """
-    mm = 1e3 * chamber.vertices
-    low, high = mm.min(axis=0), mm.max(axis=0)
+    low, high = _ends(chamber)
     planes = section_planes(chamber)
-    part = 1e3 * chamber.part.vertices
-    least, most = part.min(axis=0), part.max(axis=0)
-    beyond = np.maximum(0.0, [
-        (max(low[k] - least[k], most[k] - high[k]), most[2] - high[2])
-        for k in (one.right for one in planes)
-    ])  # fmt: skip
-    scale, outside, needs = _fit(high - low, planes, beyond, np.asarray(size))
+    scale, outside, needs = _fit(chamber, planes, size)
     middle = top - 0.5 * size[1]
-    x = left + 0.5 * (size[0] - needs)
+    x = left + 0.5 * (size[0] - needs[0])
     tall, deep = (scale * (high - low)[k] for k in (2, 1))
     for name, plane, more in zip("AB", planes, outside, strict=False):
         axis = np.array([plane.right, 2])
@@ -202,30 +195,45 @@ def draw_chamber(
     return f"{what} and plan, scale {text}{dashes}"
 
 
+def drawing_height(chamber: Chamber, size: Point) -> float:
+    """Return the height [mm] that the drawing of a chamber takes of a width and height."""
+    return float(_fit(chamber, section_planes(chamber), size)[2][1])
+
+
+def _ends(chamber: Chamber) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and the highest x, y and z of a cavity [mm], (3,) each."""
+    mm = 1e3 * chamber.vertices
+    return mm.min(axis=0), mm.max(axis=0)
+
+
 def _fit(
-    cavity: np.ndarray, planes: Sequence[SectionPlane], beyond: np.ndarray, size: np.ndarray
-) -> tuple[float, np.ndarray, float]:
+    chamber: Chamber, planes: Sequence[SectionPlane], size: Point
+) -> tuple[float, np.ndarray, np.ndarray]:
     """Return the largest scale at which sections and plan of a cavity fit on a page.
 
     Args:
-        cavity: size of the cavity along x, y and z [mm].
         planes: planes of the sections.
-        beyond: how far the part extends beyond the cavity in each section, to a side and upwards,
-            (n, 2) [mm].
         size: width and height that the drawing may have [mm].
     Returns:
-        The scale; how much of the part beyond the cavity is drawn, on the page, (n, 2) [mm]; and
-        the width of all views [mm].
+        The scale; how much of the part beyond the cavity is drawn in each section, to a side and
+        upwards, on the page, (n, 2) [mm]; and the width and height of all views [mm].
     """
+    low, high = _ends(chamber)
+    cavity, part = high - low, 1e3 * chamber.part.vertices
+    least, most = part.min(axis=0), part.max(axis=0)
+    beyond = np.maximum(0.0, [
+        (max(low[k] - least[k], most[k] - high[k]), most[2] - high[2])
+        for k in (one.right for one in planes)
+    ])  # fmt: skip
     lengths = sum(cavity[one.right] for one in planes) + cavity[0]
     for scale in SCALES:
         outside = np.minimum(MOST_OUTSIDE, scale * beyond)
         wide = scale * lengths + 2.0 * outside[:, 0].sum() + 2.0 * (len(planes) + 1) * BESIDE
         above = outside[:, 1].max()
         tall = max(scale * cavity[2] + above + FACE, scale * cavity[1]) + ABOVE + BELOW
-        if (np.array([wide, tall]) <= size).all():
+        if (np.array([wide, tall]) <= np.asarray(size)).all():
             break
-    return float(scale), outside, float(wide)
+    return float(scale), outside, np.array([wide, tall])
 
 
 def _with_limits(text: str, length: float, limits: Limits, *keys: str) -> str:

@@ -199,7 +199,7 @@ def viewer(scenes: Sequence[PartScene]) -> str:
     last = max(
         time for one in drawn for time in (one["treatment"], *(row[0] for row in one["curve"]))
     )
-    now = max(one["treatment"] for one in drawn)
+    now = min(one["treatment"] for one in drawn)  # after which all are known
     why = html.paragraph(f"{WHY_TIME} {TELLS_APART}", "soft") if saturated else ""
     panels = ""
     for i, one in enumerate(drawn):

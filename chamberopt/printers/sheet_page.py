@@ -20,7 +20,7 @@ from chamberopt.documents.document import Block, Document, Section, Sentence, Ta
 from chamberopt.documents.sheet import AsBuilt, chamber_limits, process_sheet
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
 from chamberopt.pictures.charts.figure_style import ignore_settings_here
-from chamberopt.pictures.part_drawing import LEGEND, RASTER, Limits, draw_chamber
+from chamberopt.pictures.part_drawing import LEGEND, RASTER, Limits, draw_chamber, drawing_height
 from chamberopt.pictures.section import face_size_mm
 from chamberopt.printers.report_page import PageFile, require_free_page
 from chamberopt.results.arrays_file import load_chamber
@@ -50,6 +50,7 @@ RED = "#C00000"
 COLUMNS = (88.0, 62.0, 36.0)  # mm, of a table with a head
 MM_PER_PT = 25.4 / 72.0
 LEADING = 1.25  # height of a line over the size of its letters
+HINTED = 1.04  # width of a text on a screen, whose letters take whole pixels, over that on paper
 NAMES = 0.52  # share of a column's width that names may take at most
 MOST_LINES = 4  # lines of a text; a longer text ends in an ellipsis
 MOST_REVISION = 20  # characters
@@ -191,8 +192,8 @@ def broken(
 
 
 def text_width(text: str, size: float, bold: bool = False) -> float:
-    """Return the width of a line of text [mm]. `size` is the size of the letters [pt]."""
-    return _width_over_size(text, bold) * size * MM_PER_PT
+    """Return the width of a line of text [mm] at most. `size` is the size of the letters [pt]."""
+    return HINTED * _width_over_size(text, bold) * size * MM_PER_PT
 
 
 @cache
@@ -273,15 +274,12 @@ def draw_sheet(
     content = [one for one in first.content if one not in red]
     whole = [*content, *further.content]
     top = _heading(axes, first.title, sheet, red)
-    for alone in (True, False):
-        shown, most = (whole, ALL_LINES) if alone else (content, MOST_LINES)
-        for size in SIZES:
-            room = top - FOOT + _content(Writer(None, size, most), shown, 0.0)
-            if room >= DRAWING_PER_PT * size or (alone and size <= LEAST_ALONE):
-                break
-        if room >= DRAWING_PER_PT * size:
-            break
-    tall = min(MOST_DRAWING, room) - CAPTION
+    texts = (whole, content, top - FOOT)
+    _, _, _, room = _laid_out(*texts, [DRAWING_PER_PT * size for size in SIZES])
+    # A drawing of that scale is lower than its room: with less room the letters may be larger.
+    tall = drawing_height(chamber, (INNER, min(MOST_DRAWING, room) - CAPTION))
+    shown, size, most, _ = _laid_out(*texts, [CAPTION + tall] * len(SIZES))
+    alone = shown is whole
     views = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall), limits, face)
     Writer(axes, 6.0).write(f"{views}, {LEGEND}", MARGIN, top - tall, INNER, colour=DARK_GREY)
     _content(Writer(axes, size, most), shown, top - tall - CAPTION)
@@ -292,6 +290,30 @@ def draw_sheet(
         assert isinstance(fields, Table)
         _title_block(one, [*fields.rows, ("sheet", f"{number} of {len(pages)}")])
     return [figure for one in pages if (figure := one.get_figure(root=True))]
+
+
+def _laid_out(
+    whole: Sequence[Block], content: Sequence[Block], room: float, needed: Sequence[float]
+) -> tuple[Sequence[Block], float, int, float]:
+    """Return what the first page shows, the size of its letters, and what they leave room for.
+
+    The first page has all, or where its letters would be too small, the first part of it.
+
+    Args:
+        whole, content: all that is to be shown, and its first part.
+        room: height for the text and the drawing above it [mm].
+        needed: height of the drawing with its caption for each of SIZES [mm].
+    Returns:
+        What is shown, the size [pt], the most lines of a text, and the height that is left [mm].
+    """
+    for shown, most, least in ((whole, ALL_LINES, LEAST_ALONE), (content, MOST_LINES, 0.0)):
+        for size, height in zip(SIZES, needed, strict=True):
+            left = room + _content(Writer(None, size, most), shown, 0.0)
+            if left >= height or size <= least:
+                break
+        if left >= height:
+            break
+    return shown, size, most, left
 
 
 def _page() -> Axes:

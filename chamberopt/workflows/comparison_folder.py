@@ -116,7 +116,7 @@ def _draw_differences(
 
 
 def draw_differences(picture: Path, comparison: Comparison) -> str | None:
-    """Draw the coverage of later results minus coverage of the first.
+    """Draw the coverage of later results minus coverage of the first, for a narrow page.
 
     Return the reason if no image could be drawn, else None.
     """
@@ -125,11 +125,15 @@ def draw_differences(picture: Path, comparison: Comparison) -> str | None:
         require_same_triangles(
             result.folder, one.target, comparison.results[0].folder, first.target
         )
-    return _draw_local(picture, comparison, [local_difference(first, other) for other in others])
+    local = [local_difference(first, other) for other in others]
+    return _draw_local(picture, comparison, local, one_below_other=True)
 
 
 def _draw_local(
-    picture: Path, comparison: Comparison, local: Sequence[LocalDifference]
+    picture: Path,
+    comparison: Comparison,
+    local: Sequence[LocalDifference],
+    one_below_other: bool = False,
 ) -> str | None:
     first, *later = comparison.labels
     columns = [(one.value, one.real, one.told) for one in local]
@@ -144,4 +148,5 @@ def _draw_local(
         shares = f"more on {one.more:.0%}, less on {one.less:.0%} of the target{over}"
         shares = shares.replace("%", "\N{NO-BREAK SPACE}%")
         titles.append(f"{label} minus {first}\n{shares}")
-    return draw_difference(comparison.results[0].folder, columns, titles, picture)
+    first_folder = comparison.results[0].folder
+    return draw_difference(first_folder, columns, titles, picture, one_below_other)

@@ -22,7 +22,7 @@ from chamberopt.design.materials.friction import (
     treatments,
     with_friction,
 )
-from chamberopt.design.materials.named_metals import DEFAULT_C0, computed_v0, with_numbers
+from chamberopt.design.materials.named_metals import DEFAULT_C0, SURFACES, computed_v0, with_numbers
 from chamberopt.design.materials.tables import Materials, PartMaterial, RestitutionTable
 
 __all__ = [
@@ -31,6 +31,7 @@ __all__ = [
     "CATALOGUE",
     "DEFAULT_C0",
     "NONE",
+    "SURFACES",
     "USUAL",
     "Alloy",
     "Materials",

@@ -17,8 +17,8 @@ for (const tab of document.querySelectorAll("nav button")) tab.addEventListener(
   if (tab.dataset.tab !== "results") closeResults();
 });
 
-// Another shape, holder or mask has other numbers, also where a change is undone; steps have their times.
-const KINDS = /^(chamber\.shape|holder\.kind|mask\.kind|zones\.\d+|steps(\..*)?|process\.treatment_time_s)$/;
+// Another shape, holder, mask or alloy has other numbers, also where a change is undone; steps have their times.
+const KINDS = /^(chamber\.shape|materials\.\w+(\.alloy)?|holder\.kind|mask\.kind|zones\.\d+|steps(\..*)?|process\.treatment_time_s)$/;
 const structure = () => JSON.stringify(Object.entries(state.changes).filter(([name]) => KINDS.test(name)));
 let shownOf = "";
 async function followFields() {

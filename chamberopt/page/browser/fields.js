@@ -3,7 +3,8 @@ import { attempt, change, element, endMove, onPage, original, restructure, state
 
 const OPEN = ["chamber", "shot", "sonotrode"], POSE = ["part.rotate_deg", "part.offset_mm"];
 const rows = new Map();
-export const ends = new Map(); // low and high of each slider, by name
+export const ends = new Map(); // low and high of each slider, by name: those that were set, and wide enough for the value
+const wanted = new Map(); // those that were set
 export const varied = new Set();
 
 export function makeFields() {
@@ -15,7 +16,7 @@ export function makeFields() {
     const isPose = POSE.some((name) => field.name.startsWith(name));
     if (isPose && state.file.is_drawn) continue; // where its file has it
     const { table } = field;
-    const row = field.choices ? choiceRow(field) : numberRow(field);
+    const row = field.choices ? choiceRow(field) : field.suggestions ? nameRow(field) : numberRow(field);
     if (isPose) { pose.append(row); continue; }
     if (!groups.has(table)) groups.set(table, element("details", { id: `of-${table}`, open: opened.get(`of-${table}`) ?? OPEN.includes(table) }, element("summary", { textContent: field.group, title: `[${table}]` })));
     groups.get(table).append(row);
@@ -30,7 +31,16 @@ export function makeFields() {
 // What a number is, in words, and why the file has it; its key is the tip.
 const label = (field) => element("label", { title: `${field.name} in the file`, htmlFor: field.name },
   element("b", { textContent: field.label }), " ", ...onPage(field.text),
-  ...(field.reason.length ? [element("small", {}, ...onPage(field.reason))] : []));
+  ...(field.reason.length ? [element("small", {}, element("span", { className: "changed-by" }), element("span", { className: "reason" }, ...onPage(field.reason)))] : []));
+
+// The reason of a number is that of the number in the file, and is struck where that was changed.
+function showReason(row, field, now) {
+  const [changed, reason] = [".changed-by", ".reason"].map((name) => row.querySelector(name)), was = original(field.name);
+  if (!reason || reason.textContent.startsWith("changed by you")) return;
+  const isChanged = now !== was;
+  changed.textContent = isChanged ? `changed by you; ${state.file.is_proposed ? "proposed was" : "in the file it is"} ${was ?? "none"}. ` : "";
+  reason.classList.toggle("struck", isChanged);
+}
 
 function choiceRow(field) {
   const select = element("select", { id: field.name }, ...field.choices.map(([value, textContent]) => element("option", { value, textContent })));
@@ -39,7 +49,23 @@ function choiceRow(field) {
     else attempt(() => restructure(field.name, select.value)).then(showValues); // as it was where it is refused
   });
   const row = element("div", { className: "field" }, label(field), select);
-  rows.set(field.name, { show: (now) => { select.value = now; }, row });
+  rows.set(field.name, { show: (now) => { select.value = now; showReason(row, field, now); }, row });
+  return row;
+}
+
+// A name of a catalogue, of which it suggests what begins or is called like what is typed.
+function nameRow(field) {
+  const list = element("datalist", { id: `suggested-for-${field.name}` }, ...field.suggestions.map(([value, label]) => element("option", { value, label })));
+  const box = element("input", { id: field.name, placeholder: "type to search" });
+  box.setAttribute("list", list.id);
+  box.addEventListener("change", () => change({ [field.name]: box.value.trim() }));
+  const row = element("div", { className: "field named" }, label(field), box, list);
+  const show = (now) => {
+    if (document.activeElement !== box) box.value = now ?? "";
+    row.classList.toggle("changed", now !== original(field.name));
+    showReason(row, field, now);
+  };
+  rows.set(field.name, { show, row });
   return row;
 }
 
@@ -57,30 +83,33 @@ function numberRow(field) {
   const box = element("input", { type: "text", inputMode: "decimal", id: field.name, placeholder: "not set", disabled: field.fixed });
   const slider = element("input", { type: "range", disabled: field.fixed, ariaLabel: field.name });
   const [low, high] = [0, 1].map(() => element("input", { type: "number", step: "any", ariaLabel: `end of the slider of ${field.name}` }));
-  if (!ends.has(field.name)) ends.set(field.name, firstEnds(field));
+  if (!wanted.has(field.name)) wanted.set(field.name, firstEnds(field));
+  const holding = (now, [least, most]) => now === null ? [least, most] : [Math.min(now, least), Math.max(now, most)];
+  ends.set(field.name, holding(value(field.name), wanted.get(field.name)));
   const scale = () => {
     [low.value, high.value] = [slider.min, slider.max] = ends.get(field.name);
     const span = slider.max - slider.min;
     slider.step = field.whole ? 1 : 10 ** Math.floor(Math.log10(span / 100)) || "any";
   };
-  const bound = (wanted) => { // gives why other ends than these are taken, or ""
-    const [least, most] = wanted, now = value(field.name);
-    if (least < most) ends.set(field.name, wanted);
-    scale();
-    if (varied.has(field.name)) document.dispatchEvent(new Event("varied"));
+  const bound = ([least, most]) => { // gives why other ends than these are taken, or ""
+    const now = value(field.name);
+    if (least < most) wanted.set(field.name, holding(now, [least, most]));
     show(now);
+    scale(); // also where nothing is taken
     if (!(least < most)) return `${least} is not less than ${most}: change the other end first.`;
     return now !== null && (now < least || now > most) ? `The design has ${now}, which is to lie between the ends.` : "";
   };
   const show = (now) => {
-    const [least, most] = ends.get(field.name);
-    if (now !== null && (now < least || now > most)) { // a study between the ends has the value too
-      bound([Math.min(now, least), Math.max(now, most)]);
-      return;
+    const own = holding(now, wanted.get(field.name)); // a study between the ends has the value too
+    if (String(own) !== String(ends.get(field.name))) {
+      ends.set(field.name, own);
+      scale();
+      if (varied.has(field.name)) document.dispatchEvent(new Event("varied"));
     }
     if (document.activeElement !== box) box.value = now ?? "";
     slider.value = now ?? slider.min;
     row.classList.toggle("changed", now !== original(field.name));
+    showReason(row, field, now);
   };
   slider.addEventListener("input", () => change({ [field.name]: Number(slider.value) }, field.name));
   slider.addEventListener("change", endMove);
@@ -118,9 +147,9 @@ export function showValues() { for (const [name, { show }] of rows) show(value(n
 // Let a search change these numbers, between these ends, and no others.
 export function varyOnly(asked) {
   varied.clear();
-  for (const [name, wanted] of Object.entries(asked)) {
+  for (const [name, between] of Object.entries(asked)) {
     if (!state.fields.some((one) => one.name === name && one.varies && !one.fixed)) continue;
-    ends.set(name, wanted);
+    wanted.set(name, between);
     varied.add(name);
   }
   makeFields();

@@ -1,7 +1,7 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
 import { asLines, ask, attempt, element, onPage, unpack, warning, wordsOf } from "./state.js";
 import { followed, sinceBegin, stage } from "./steps.js";
-import { colourByState, lights, wayToTarget } from "./surfaces.js";
+import { colourByState, lights } from "./surfaces.js";
 
 const find = (id) => document.getElementById(id);
 const option = (one) => element("option", { value: [one].flat()[0], textContent: [one].flat().at(-1) }); // a text, or a pair with its words
@@ -83,7 +83,7 @@ async function drawChamber(isDraft) {
   view.lines("edges", answer.edges, seen.edges, "wall");
   const [low, high] = answer.shape_mm;
   const box = { low: low.map((x, i) => Math.min(x, answer.part_mm[0][i])), high: high.map((x, i) => Math.max(x, answer.part_mm[1][i])) };
-  lookAt(box, wayToTarget(view.get("part"), answer));
+  lookAt(box, answer.way);
   document.body.dataset.chamber = isDraft ? "draft" : "proposal";
 }
 view.renderer.domElement.addEventListener("dblclick", () => { if (view.home) view.look(view.home); });
@@ -91,8 +91,9 @@ const shows = (named, name) => lights(named, view, () => ask("/face", { part: kn
 
 // Read a part, to say its size, and to ask for its unit where the file states none.
 async function look(part, unit = "") {
+  if (part !== known.part) find("sizes").hidden = true;
   Object.assign(known, { part, unit });
-  find("propose").disabled = find("sizes").hidden = find("names").hidden = true;
+  find("propose").disabled = find("names").hidden = true;
   find("known").textContent = part ? `reading ${part} …` : "";
   document.body.dataset.known = "";
   if (!part) { draw(""); return; }
@@ -100,12 +101,13 @@ async function look(part, unit = "") {
     const seen = await ask("/look", { part, unit });
     if (known.part !== part || known.unit !== unit) return;
     const sizes = Object.entries(seen.sizes);
-    find("sizes").hidden = !sizes.length;
-    find("sizes").replaceChildren(find("sizes").firstElementChild, ...sizes.map(([name, size]) => {
-      const button = element("button", { textContent: `${size} (numbers in ${name === "in" ? "inches" : name})` });
+    if (!unit || sizes.length) find("sizes").hidden = !sizes.length; // a unit that was chosen can be chosen anew
+    if (sizes.length) find("sizes").replaceChildren(find("sizes").firstElementChild, ...sizes.map(([name, size]) => {
+      const button = element("button", { value: name, textContent: `${size} (numbers in ${name === "in" ? "inches" : name})` });
       button.addEventListener("click", () => attempt(() => look(part, name)));
       return element("span", {}, button, " ");
     }));
+    for (const button of find("sizes").querySelectorAll("button")) button.ariaPressed = String(button.value === unit);
     find("names").hidden = !seen.names.length;
     find("names").replaceChildren(find("names").firstElementChild, ...seen.names.map(([name, text]) =>
       shows(element("label", {}, element("input", { type: "checkbox", value: name }), ` ${name}: ${text}`), name)));
@@ -160,12 +162,12 @@ function tell({ steps, seconds, printed, warnings, fault, exit, picture, result,
     find("picture").href = `/files/${picture[0].split("/").map(encodeURIComponent).join("/")}?${drawn = picture[1]}`;
     find("picture").firstElementChild.src = find("picture").href;
   }
-  find("proposal").hidden = !proposal;
+  find("proposal").hidden = find("sentence").hidden = !proposal;
   find("rows-fold").hidden = !proposal;
   find("another").hidden = !proposal || !known.part;
   const isDraft = exit === null, now = JSON.stringify([proposal, result, isDraft]);
   if (proposal && drawnPart && now !== told) attempt(() => drawChamber(isDraft));
-  find("draft").hidden = !isDraft;
+  find("draft").hidden = !isDraft || !proposal;
   find("made-end").hidden = isDraft;
   if (!proposal || now === told) return; // its buttons stay while one is pointed at
   told = now;

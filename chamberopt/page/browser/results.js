@@ -46,7 +46,8 @@ find("show-results").addEventListener("click", () => attempt(() => show()));
 async function show() {
   const folders = ticked().reverse(); // the older first
   if (!folders.length || folders.length > 2) throw new Error("tick one result, or two to compare");
-  const { html, content, longer } = await ask("/shown", { folders });
+  const { html, content, longer, places } = await ask("/shown", { folders });
+  if (find("results").hidden && find("study-view").hidden) return; // another tab was opened meanwhile
   closeResults();
   seen = folders;
   find("shown").innerHTML = html; // the server's own, as in a report; names in it are escaped
@@ -55,7 +56,7 @@ async function show() {
   if (longer.times) find("stale").after(element("p", {}, simulateLonger(longer)));
   views = showParts(content);
   await refresh();
-  if (folders.length > 1) await showDifference(folders);
+  if (places) await showDifference(folders);
 }
 
 // A button that makes the simulated time of the design longer, and leads to where it is simulated.
@@ -93,7 +94,7 @@ listen((what) => { if (what === "changed" && seen.length) refresh().catch(() => 
 
 // Show what a command has found.
 const showFolder = (folder) => attempt(async () => {
-  document.querySelector("[data-tab=results]").click();
+  if (find("study-view").hidden) document.querySelector("[data-tab=results]").click(); // a study stays beside its result
   await refresh(() => [folder]);
   if (ticked().length) await show();
 });

@@ -23,6 +23,7 @@ export function fillRun() {
   showVaried();
 }
 
+let searched = ""; // folder of a search of the chosen study
 let isRunning = false, refused = ""; // why the chosen file cannot be run
 const chosen = () => state.file.files.find((one) => one.name === find("of").value);
 // A design is simulated; a study is searched or mapped.
@@ -32,6 +33,8 @@ function allow() {
   find("of-words").textContent = kind === "study" ? words : "";
   for (const button of document.querySelectorAll("[data-command], #search-sliders")) button.disabled = isRunning || (Boolean(refused) && "command" in button.dataset);
   for (const one of document.querySelectorAll(".of-design, .of-study")) one.hidden = one.className !== `of-${kind}`;
+  find("go-on").hidden ||= !searched;
+  find("more-of").disabled = isRunning;
 }
 find("of").addEventListener("change", () => {
   takeQuestion(chosen());
@@ -43,6 +46,8 @@ find("of").addEventListener("change", () => {
 function takeQuestion(file) {
   if (!file?.asks) return;
   const { aim, vary, evaluations } = file.asks;
+  limits = file.asks.limits.map(([name, label, side, value]) => ({ name, label, side, value }));
+  showLimits();
   if (state.file.aims.some(([name]) => name === aim)) find("aim").value = aim;
   if (evaluations) find("evaluations").value = evaluations;
   varyOnly(vary);
@@ -51,15 +56,40 @@ function takeQuestion(file) {
 // How long the file will take, where the server knows that from results, or why it will be refused.
 async function tellDuration() {
   const of = find("of").value;
-  refused = "";
+  refused = searched = "";
   const known = await ask("/duration", { of }).catch((error) => { refused = wordsOf(error); });
   if (find("of").value !== of) return;
   find("lasts").className = refused ? "wrong" : "soft";
   find("lasts").replaceChildren(...(refused ? [...onPage(refused), element("p", { hidden: !chosen()?.asks, textContent: "The search below asks the same between values that hold those of the design." })]
     : [known.words ? `It will take ${known.words}.` : ""]));
+  searched = known?.searched ?? "";
+  find("searched").textContent = searched;
   allow();
 }
 document.querySelector("[data-tab=run]").addEventListener("click", tellDuration);
+
+// Limits of figures: name, label with unit, side and value of each.
+let limits = [];
+function showLimits() {
+  find("limits").replaceChildren(...limits.map((one) => {
+    const options = [...state.file.figures, ...(state.file.figures.some(([name]) => name === one.name) ? [] : [[one.name, one.label]])];
+    const figure = element("select", { ariaLabel: "figure" }, ...options.map(([value, textContent]) => element("option", { value, textContent })));
+    const side = element("select", { ariaLabel: "side of the limit" }, ...[["min", "at least"], ["max", "at most"]].map(([value, textContent]) => element("option", { value, textContent })));
+    const box = element("input", { type: "number", step: "any", ariaLabel: "limit" });
+    [figure.value, side.value, box.value] = [one.name, one.side, one.value];
+    figure.addEventListener("change", () => Object.assign(one, { name: figure.value, label: figure.selectedOptions[0].textContent }));
+    side.addEventListener("change", () => { one.side = side.value; });
+    box.addEventListener("change", () => { one.value = box.value; });
+    const out = element("button", { type: "button", textContent: "✕", title: "leave this limit out" });
+    out.addEventListener("click", () => { limits = limits.filter((other) => other !== one); showLimits(); });
+    return element("li", {}, figure, side, box, out);
+  }));
+}
+find("add-limit").addEventListener("click", () => {
+  const [[name, label]] = state.file.figures;
+  limits.push({ name, label, side: "min", value: "" });
+  showLimits();
+});
 
 let putBack = []; // a number whose ends were put back, and why
 function showVaried() {
@@ -110,6 +140,7 @@ function show({ command, result, steps, seconds, printed, exit }) {
   allow();
   const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
   find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...toResult(command, result, exit));
+  find("study-progress").replaceChildren(...(study ? [...find("progress").children].map((one) => one.cloneNode(true)) : [])); // which is in its place
   find("printed").replaceChildren(...asLines(printed));
   find("printed-fold").hidden = !printed.length;
   if (exit) find("printed-fold").open = true;
@@ -139,11 +170,18 @@ for (const button of document.querySelectorAll("[data-command]")) button.addEven
   await save();
   await followToEnd(await ask("/start", { command: button.dataset.command, of: find("of").value, points: find("points").value }));
 }, find("run-fault")));
+find("more-of").addEventListener("click", () => attempt(async () => {
+  await save();
+  const started = await ask("/more", { folder: searched, evaluations: Number(find("more-of-it").value) });
+  await read(); // the further study is a file of its own
+  await followToEnd(started);
+}, find("run-fault")));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
 // Write the study of the sliders, and run it.
 find("search-sliders").addEventListener("click", () => attempt(async () => {
   const vary = Object.fromEntries([...varied].map((name) => [name, ends.get(name)]));
-  const question = { vary, aim: find("aim").value, name: find("study-name").value, evaluations: Number(find("evaluations").value) };
+  const question = { vary, aim: find("aim").value, name: find("study-name").value, evaluations: Number(find("evaluations").value),
+    limits: limits.map(({ name, side, value }) => [name, side, value === "" ? null : Number(value)]) };
   await save();
   const { study } = await ask("/study", question);
   await read();

@@ -1,6 +1,6 @@
 // The view: part and chamber as the newest answers have them, and handles that turn and move the part.
 import { change, endMove, unpack, value } from "./state.js";
-import { colourByState, wayToTarget } from "./surfaces.js";
+import { colourByState } from "./surfaces.js";
 
 const BODIES = ["deflectors", "holder", "mask"]; // that not every chamber has
 export const view = new View3D(document.getElementById("view"));
@@ -81,7 +81,7 @@ function lookAtAll() {
   const [inner, outer] = placed.shape_mm, room = 0.4 * Math.hypot(...outer.map((x, i) => x - inner[i]));
   const low = inner.map((x, i) => Math.min(x, Math.max(x - room, placed.part_mm[0][i])));
   const high = outer.map((x, i) => Math.max(x, Math.min(x + room, placed.part_mm[1][i])));
-  const size = Math.hypot(...high.map((x, i) => x - low[i])), centre = mid(low, high), way = wayToTarget(view.get("part"), placed);
+  const size = Math.hypot(...high.map((x, i) => x - low[i])), centre = mid(low, high), { way } = placed;
   view.look({ middle: centre, eye: centre.map((x, i) => x + 2.6 * size * way[i]), size });
 }
 

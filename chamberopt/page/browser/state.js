@@ -59,7 +59,8 @@ export function showStep(step) {
 }
 
 // What the file has, or where it has no such number, what the design with its shape or holder takes by default.
-export const original = (name) => [...inFile(name), ...state.fields].find((one) => one.name === name)?.value ?? null;
+export const original = (name) => [...catalogue(), ...inFile(name), ...state.fields].find((one) => one.name === name)?.value ?? null;
+const catalogue = () => state.fields.filter((one) => one.fixed); // numbers of the alloy that is named now
 // Fields of the file by which a name stands for what it does now: not of a step where one is gone.
 const inFile = (name) => "steps" in state.changes && name.startsWith("steps.") ? [] : state.file.fields;
 export const value = (name) => name in state.changes ? state.changes[name] : original(name);

@@ -10,30 +10,6 @@ export function colourByState(view, name, { states, kinds }, state) {
   view.colourTriangles(name, colours);
 }
 
-// Unit vector to the eye from which most of the target faces it, of twelve from above and as many from below.
-export function wayToTarget(part, { rotation: r, state }) {
-  const corners = part.geometry.getAttribute("position").array, ways = [];
-  for (const up of [0.33, -0.33]) for (let k = 0; k < 12; k++) {
-    const turn = (k - 1.95) * Math.PI / 6;
-    ways.push([0.94 * Math.cos(turn), 0.94 * Math.sin(turn), up]);
-  }
-  const worth = ways.map(() => 0);
-  for (let k = 0; k < state.length; k++) {
-    if (state[k] !== 1) continue;
-    const [a, b, c] = [0, 3, 6].map((i) => new THREE.Vector3().fromArray(corners, 9 * k + i));
-    const own = b.sub(a).cross(c.sub(a)), normal = [0, 1, 2].map((i) => r[3 * i] * own.x + r[3 * i + 1] * own.y + r[3 * i + 2] * own.z);
-    ways.forEach((way, i) => { worth[i] += Math.max(0, way[0] * normal[0] + way[1] * normal[1] + way[2] * normal[2]); });
-  }
-  const best = (first) => { // the usual way where much the same is seen from all sides
-    const most = Math.max(...worth.slice(first, first + 12));
-    return worth[first] > 0.9 * most ? first : worth.indexOf(most, first);
-  };
-  const above = best(0), below = best(12);
-  const [x, y, z] = ways[worth[below] > 2 * worth[above] ? below : above]; // the floor hides least from above
-  const aside = [1.1 * x + 0.5 * ways[0][0], 1.1 * y + 0.5 * ways[0][1]], long = 0.94 / Math.hypot(...aside);
-  return [long * aside[0], long * aside[1], z]; // a little aside shows its depth
-}
-
 // `answer` gives what the server answers of the triangles of the surface that `named` names.
 export function lights(named, view, answer, colour) {
   let isOn = false, found = null;

@@ -163,6 +163,28 @@ class Comparison(ShownInNotebook):
     confidence: float
 
 
+def require_comparable(results: Sequence[Result]) -> None:
+    """Raise InputError if parts, targets, windows or calibrations of results differ."""
+    folders, designs = zip(*((one.folder, one.design) for one in results), strict=True)
+    parts = [(result.record.part_sha256, part_unit(result)) for result in results]
+    require_same_part(folders, designs, parts)
+    require_same_gauge(folders, designs)
+    require_same_machine(folders, designs)
+
+
+def coverage_after(result: Result, seconds: float) -> Estimate | None:
+    """Return the mean coverage of a result's target after a time [s]; None beyond what it tells."""
+    rows = result.record.coverage_against_time
+    if not rows or not result.metrics["mean_coverage"].has_number or seconds > rows[-1].time_s:
+        return None
+    times = [0.0, *(one.time_s for one in rows)]
+    values = [0.0, *(one.mean_coverage for one in rows)]
+    widths = [0.0, *(one.half_width for one in rows)]
+    return Estimate(
+        float(np.interp(seconds, times, values)), float(np.interp(seconds, times, widths))
+    )
+
+
 def compare(paths: Sequence[str | Path]) -> Comparison:
     """Compare results folders of the same part and target with the first of them.
 
@@ -184,13 +206,8 @@ def comparison_of(results: Sequence[Result], names: Sequence[str]) -> Comparison
     results are compared as independent samples (Welch).
     """
     first, folders = results[0], [result.folder for result in results]
-    designs = [result.design for result in results]
-    require_same_part(
-        folders, designs, [(result.record.part_sha256, part_unit(result)) for result in results]
-    )
-    require_same_time(folders, designs)
-    require_same_gauge(folders, designs)
-    require_same_machine(folders, designs)
+    require_same_time(folders, [result.design for result in results])
+    require_comparable(results)
     same_goal = all(result.objective_name == first.objective_name for result in results)
     metrics = (
         {first.objective_name: tuple(result.objective for result in results)} if same_goal else {}

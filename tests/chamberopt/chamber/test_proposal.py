@@ -299,8 +299,7 @@ def test_legs_outside_of_the_walls_hang_beside_the_sonotrode_or_stay_above_it(
         return [min(known, key=lambda one: abs(one.keys["faces"][0]["at_mm"][2] + 11.0)).name]
 
     found, alone = (
-        propose(tmp_path / f"{name}.stl", Wanted(unit="m"), pad_of)
-        for name in ("table", "bare")
+        propose(tmp_path / f"{name}.stl", Wanted(unit="m"), pad_of) for name in ("table", "bare")
     )
     distances = [one.design.chamber.sonotrode_distance for one in (found, alone)]
     assert all(one.sonotrode_count == 1 for one in (found, alone))

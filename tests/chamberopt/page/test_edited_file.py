@@ -39,6 +39,21 @@ def test_one_number_is_one_line(file: EditedFile) -> None:
     assert EditedFile(file.path, False).design == changed
 
 
+def test_the_reason_of_a_changed_number_says_of_what_it_was(file: EditedFile) -> None:
+    """In a proposed design the comments are reasons; in others they stay as they are."""
+    text = file.path.read_text().replace("# to try", "# room for two balls")
+    file.path.write_text(f"# A first chamber, proposed by `chamberopt new`: rules.\n{text}")
+    for height, comment in (
+        (40, "changed by you; proposed was 30: room for two balls"),
+        (42, "changed by you; proposed was 30: room for two balls"),
+        (30, "room for two balls"),
+    ):
+        EditedFile(file.path, False).save({"chamber.height_mm": height})
+        assert f"height_mm = {height}   # {comment}\n" in file.path.read_text()
+        rows = {one["name"]: one for one in design_fields(EditedFile(file.path, False))}
+        assert rows["chamber.height_mm"]["reason"] == [comment]
+
+
 @pytest.mark.parametrize(
     ("changes", "written"),
     [
@@ -281,3 +296,20 @@ def test_a_step_is_removed_from_the_file_or_from_the_changes(file: EditedFile) -
     assert tomllib.loads(file.path.read_text()) == tomllib.loads(before)
     with pytest.raises(InputError, match="step: given 0"):
         without_step(saved.design, {}, 3, 0)
+
+
+def test_an_alloy_is_named_and_its_numbers_follow(file: EditedFile) -> None:
+    text = file.path.read_text()
+    numbers = "part = { C0 = 0.91, v0_m_s = 0.17, hardness_HB = 120 }"
+    assert not file.alloys()  # numbers alone
+    file.path.write_text(text.replace(numbers, 'part = "42CrMo4"'))
+    named = EditedFile(file.path, False)
+    (row,) = [one for one in design_fields(named) if "suggestions" in one]
+    assert row["name"] == "materials.part"
+    assert row["value"] == "42CrMo4"
+    assert ("Ti-6Al-4V", "titanium") in row["suggestions"]
+    other = named.changed({"materials.part": "Ti-6Al-4V"})
+    assert other.design.value("materials.part.hardness_HB") == 334
+    assert 'part = "Ti-6Al-4V"' in other.text
+    with pytest.raises(InputError, match=r"materials\.part: .*did you mean 'Ti-6Al-4V'"):
+        named.with_changes({"materials.part": "Ti-6Al-4W"})

@@ -42,7 +42,10 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             opened.wait("data-known=sizes")  # an STL states no unit
             assert page.locator("#propose").is_disabled()
             opened.wait("data-drawn='my part.stl'")  # before its unit is known
-            page.click("#sizes button >> text=in mm)")
+            page.click("#sizes button >> text=in inches)")
+            expect(page.locator("#known")).to_contain_text("measures 406.4 x 406.4 x 406.4 mm")
+            page.click("#sizes button >> text=in mm)")  # it can be chosen anew
+            expect(page.locator("#sizes [aria-pressed=true]")).to_contain_text("in mm)")
             opened.wait("data-known=all")
             expect(page.locator("#known")).to_contain_text("my part.stl measures 16 x 16 x 16 mm")
             box = page.locator("#propose").bounding_box()
@@ -68,6 +71,8 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             expect(page.locator("#sentence")).to_contain_text("Peen face 1 (")
             page.wait_for_function(IS_LOADED)
             opened.wait("data-chamber=proposal")  # it is seen in 3D too
+            sentence, drawn = (page.locator(one).bounding_box() for one in ("#sentence", "#view"))
+            assert sentence["y"] + sentence["height"] <= drawn["y"]  # what is proposed comes first
             kinds = {"target", "sonotrode", "chamber wall"}
             expect(page.locator("#legend")).to_contain_text("chamber wall")  # at the next frame
             assert set(page.locator("#legend li").all_text_contents()) >= kinds
@@ -92,6 +97,12 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             label = page.locator('label[for="chamber.height_mm"]')
             expect(label).to_contain_text("Height")
             expect(label).to_contain_text("sonotrode to ceiling")  # the reason of its number
+            opened.put("chamber.height_mm", 77)
+            proposed = page.locator('label[for="chamber.height_mm"] .struck')
+            expect(proposed).to_contain_text("sonotrode to ceiling")  # which is of another number
+            expect(label).to_contain_text("changed by you; proposed was ")
+            page.click("#undo")
+            expect(proposed).to_have_count(0)
             assert page.locator('[id="process.coverage_percent"]').input_value() == "200"
             page.click("#front")
             expect(page.locator("#designs")).to_contain_text("my part/design.toml")

@@ -18,6 +18,7 @@ from chamberopt.chamber.checks.facts import describe
 from chamberopt.design.load import load_design
 from chamberopt.documents.facts import facts_in_words
 from chamberopt.page.page_words import TERMS
+from chamberopt.search.study import load_study
 from tests.chamberopt.page.conftest import Served
 from tests.hunt.base import write_base
 
@@ -105,6 +106,17 @@ def test_a_report_cannot_use_the_server(served: Served) -> None:
             },
             "given [40, 60], but the design starts at 30",
         ),
+        (
+            "/study",
+            {
+                "name": "s.toml",
+                "vary": {"chamber.height_mm": [20, 60]},
+                "evaluations": 3,
+                "aim": "p05_coverage",
+                "limits": [["mean_coverage", "min", None]],
+            },
+            "limit of mean coverage of the target: given None; give a number",
+        ),
         ("/shape", {"changes": {"shot.mass_g": "much"}}, "shot.mass_g: given 'much'"),
         ("/shape", {"changes": {"no.key": 1}}, "not changed on the page"),
         ("/shape", {"changes": {"chamber.shape": "shape.py"}}, "not changed on the page"),
@@ -137,6 +149,27 @@ def test_a_wrong_question_is_answered_in_words(
     answer = served.ask(path, question)
     assert said in answer["error"] if said else answer["superseded"]
     assert sorted(served.folder.rglob("*")) == before
+
+
+def test_a_study_is_asked_with_limits_in_the_units_of_the_page(served: Served) -> None:
+    limits = [
+        ["mean_coverage", "min", 90],
+        ["std_coverage", "max", 12.5],
+        ["mean_coverage", "max", 99],
+    ]
+    question = {"name": "limited", "evaluations": 3, "aim": "p05_coverage", "limits": limits}
+    varied = {"vary": {"chamber.height_mm": [20, 60]}}
+    assert served.ask("/study", question | varied) == {"study": "limited.toml"}
+    study = load_study(served.folder / "limited.toml")
+    held = {name: (one.min, one.max) for name, one in study.constraints.items()}
+    assert held == {"mean_coverage": (0.9, 0.99), "std_coverage": (None, 0.125)}
+    files = served.ask("/read", {})["files"]
+    (asks,) = [one["asks"] for one in files if one["name"] == "limited.toml"]
+    assert sorted((name, side, value) for name, _, side, value in asks["limits"]) == sorted(
+        (name, side, value) for name, side, value in limits
+    )
+    assert served.ask("/duration", {"of": "limited.toml"})["searched"] == ""
+    (served.folder / "limited.toml").unlink()
 
 
 def test_nonsense_is_refused(served: Served) -> None:

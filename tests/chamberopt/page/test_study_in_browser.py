@@ -21,7 +21,10 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def opened(out: Path) -> Iterator[Page]:
+    study = out.parents[1] / "study.toml"
+    asked = study.read_text()
     served = Served(out.parents[1], "design.toml")
+    study.write_text(asked)  # the page's own folder begins with another study
     with chromium() as browser:
         yield Page(browser, served)
     served.process.kill()
@@ -32,6 +35,19 @@ def test_a_study_is_followed_and_a_candidate_taken(opened: Page, out: Path) -> N
     page, log = opened.page, out / "history.jsonl"
     rows = log.read_text().splitlines(keepends=True)
     log.write_text("".join(rows[:FIRST]))
+    # the form of the search has the study's limits, and goes on with what was searched
+    opened.tab("run")
+    page.select_option("#of", "study.toml")
+    expect(page.locator("#go-on")).to_contain_text("new chambers after results/study.")
+    limits = page.locator("#limits li")
+    expect(limits).to_have_count(1)
+    page.click("#add-limit")
+    expect(limits).to_have_count(2)
+    page.click("#search-sliders")
+    expect(page.locator("#search-fault")).to_contain_text("mean coverage of the target")
+    limits.last.locator("button").click()
+    expect(limits).to_have_count(1)
+
     opened.tab("results")
     page.click("text=see its candidates")
     opened.wait(f"data-followed='{FIRST}'")
@@ -89,6 +105,13 @@ def test_a_study_is_followed_and_a_candidate_taken(opened: Page, out: Path) -> N
     expect(page.locator("#unsaved")).to_have_text("not saved yet")
     assert float(page.locator('[id="chamber.height_mm"]').input_value()) == height
     assert opened.saved().chamber.height_mm == height
+    beside_study = page.locator("#view").bounding_box()
     page.click("#close-study")
     expect(page.locator("#study-view")).to_be_hidden(timeout=WAIT)
+    alone = page.locator("#view").bounding_box()
+    assert beside_study["width"] > 0.85 * alone["width"]  # the view keeps its room
+    assert beside_study["height"] == alone["height"]
+    page.click("text=see its candidates")
+    opened.tab("numbers")  # which is in the place of the study
+    expect(page.locator("#study-view")).to_be_hidden()
     assert opened.errors == []

@@ -196,7 +196,7 @@ def test_a_comparison_and_a_sweep_give_their_best_and_their_figures(
     shutil.copytree(first.folder, other)
     found = shown(compare([first.folder, other]))
     assert "Comparison with" in found.words
-    assert "other: the uniform coverage is" in found.words
+    assert ": the uniform coverage of both is" in found.words
     assert metric_label("mean_coverage").text in found.words
     study = Study(design=plate_design(), vary={"shot.mass_g": (3.0, 6.5)})
     values = {"shot.mass_g": 4.0}, (Estimate(0.4, 0.01),), {"mean_coverage": Estimate(0.5, 0.01)}

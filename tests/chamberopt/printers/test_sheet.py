@@ -34,7 +34,7 @@ from chamberopt.documents.sheet import (
 )
 from chamberopt.documents.wording import metric_label
 from chamberopt.peening.tolerance_result import ToleranceResult, ToleratedFigure
-from chamberopt.pictures.part_drawing import draw_chamber
+from chamberopt.pictures.part_drawing import draw_chamber, drawing_height
 from chamberopt.pictures.section import cut, face_size_mm, inside, section_planes
 from chamberopt.printers.sheet_page import (
     HEIGHT,
@@ -419,3 +419,12 @@ def test_lines_are_broken_to_their_width() -> None:
     assert any("12.3\u00a0±\u00a00.4\u00a0%" in line for line in lines)
     assert broken(100 * "word ", 20.0, 8.0)[-1].endswith("…")
     assert broken("工 gear\x1b\n1", 30.0, 8.0) == ["? gear? 1"]  # the font has no such letters
+
+
+def test_a_drawing_takes_no_more_height_than_its_views() -> None:
+    """At the same scale it is drawn in less height, which leaves larger letters room."""
+    chamber = build_chamber(plate_design())
+    height = drawing_height(chamber, (186.0, 118.0))
+    assert height < 118.0
+    assert drawing_height(chamber, (186.0, height)) == height
+    assert drawing_height(chamber, (186.0, height - 1.0)) < height - 1.0

@@ -17,7 +17,7 @@ export function followStudy(of) {
   find("study-of").replaceChildren();
   find("study-same").hidden = true;
   find("tried").textContent = find("study-sentence").textContent = "";
-  find("chosen-candidate").replaceChildren(element("p", { className: "soft", textContent: "Click a point to see its numbers, and its chamber above." }));
+  find("chosen-candidate").replaceChildren(element("p", { className: "soft", textContent: "Click a point to see its numbers, and its chamber in the view." }));
   find("study-view").hidden = false;
   look();
 }
@@ -35,6 +35,7 @@ function closeStudy() {
   show(null);
 }
 find("close-study").addEventListener("click", closeStudy);
+for (const tab of document.querySelectorAll("nav button")) tab.addEventListener("click", () => { if (folder) closeStudy(); }); // whose place it takes
 find("study-result").addEventListener("click", () => document.dispatchEvent(new CustomEvent("result", { detail: folder })));
 
 // Look at the study, draw what is new, and look again until it has ended.
@@ -60,6 +61,7 @@ async function look() {
     find("study-sentence").textContent = running() === mine ? "No candidate yet." : error.message; // its folder is not there at once
   }
   const ours = running() === mine;
+  find("study-progress").hidden = !ours;
   find("study-stop").disabled = !ours;
   find("study-resume").disabled = Boolean(running()) || Boolean(data?.finished);
   find("study-result").disabled = !data?.finished;
@@ -82,7 +84,7 @@ const short = (x) => String(Number(x.toPrecision(3)));
 const mark = (one) => ({ ...one.mark, ring: one.number === chosen ? "#1c2226" : one.is_best ? BEST : "" });
 
 // Width of a plot [px]: that of the panel, or half of it.
-const wide = () => Math.max(320, find("study-of").clientWidth);
+const wide = () => Math.max(240, find("study-of").clientWidth);
 const half = () => wide() < 520 ? wide() : Math.min(400, wide() / 2 - 5);
 const searched = () => data.candidates.filter((one) => one.kind !== "confirmed");
 const objectiveAxis = () => ({ low: data.range[0], high: data.range[1], label: data.objectives[0] });

@@ -33,7 +33,7 @@ class Measure {
     const met = Measure.#met(view, event), round = met?.name ? Round.of(view.get(met.name), met.triangle, met.place) : null;
     const across = round ? [`⌀ ${Measure.number(round.diameter)} mm`] : [], lines = first ? [...Measure.words(first, hit), ...across] : across;
     this.#show(view, first ? [first.place, hit.place] : [hit.place], lines, round);
-    this.tell(first ? lines.join("; ") : [...across, `from ${Measure.at(hit.place)}: click the other point`].join("; "));
+    this.tell(first ? lines.join("; ") : [...across, `from ${hit.on} at ${Measure.at(hit.place)}: click the other point`].join("; "));
   }
 
   #show(view, places, words, round) {
@@ -64,14 +64,14 @@ class Measure {
     return words;
   }
 
-  // The place that a click means, on a corner or edge if one is near: { place, normal: null at an edge }; null for none.
+  // The place that a click means, on a corner or edge if one is near: { place, normal: null at an edge, on: what it is on }; null for none.
   static place(view, event) {
     const seen = Measure.ASIDE.map(([x, y]) => Measure.#met(view, { clientX: event.clientX + x, clientY: event.clientY + y }));
     const edges = seen.flatMap((hit) => hit ? Measure.#edges(view, hit) : []).map(({ place, isEnd }) => {
       const [x, y] = view.onScreen(place), away = Math.hypot(x - event.clientX, y - event.clientY);
-      return { place, away, order: isEnd ? away - Measure.NEAR : away }; // a corner near it is meant
+      return { place, away, on: isEnd ? "a corner" : "an edge", order: isEnd ? away - Measure.NEAR : away }; // a corner near it is meant
     }).filter(({ place, away }) => away < Measure.NEAR && !view.section.hides(place)).sort((a, b) => a.order - b.order);
-    return edges.length ? { place: edges[0].place, normal: null } : seen[0];
+    return edges.length ? { place: edges[0].place, on: edges[0].on, normal: null } : seen[0] && { ...seen[0], on: "a face" };
   }
 
   // What a click meets: a body that is cut, or a surface. Walls and sonotrode are seen through from behind.

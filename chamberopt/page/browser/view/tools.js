@@ -26,6 +26,11 @@ class Tools {
     this.at = make("input", { type: "number", step: "any", ariaLabel: "place of the section in mm" });
     this.flip = make("button", { textContent: "Flip", title: "show the other side" });
     this.told = make("output", {});
+    this.parallel = make("button", { textContent: "Parallel", title: "parallel lines of sight, so that equal lengths are equal in the view; or as the eye sees" });
+    this.parallel.addEventListener("click", () => {
+      this.parallel.ariaPressed = String(this.parallel.ariaPressed !== "true");
+      for (const view of this.views) view.parallel(this.parallel.ariaPressed === "true");
+    });
     this.from = make("span", { className: "joined", role: "group", ariaLabel: "view" }, ...Object.entries(Tools.WAYS).map(([textContent, [way, title]]) => {
       const button = make("button", { textContent, title });
       button.addEventListener("click", () => { for (const view of this.views) view.from(way); });
@@ -35,9 +40,9 @@ class Tools {
     this.chamber.addEventListener("change", () => this.#hide(Tools.CHAMBER, !this.chamber.checked));
     const chamber = make("label", { hidden: true }, this.chamber, " show the chamber");
     this.controls = make("span", { hidden: true, className: "cut" }, this.by, this.slider, make("label", {}, this.at, " mm"), this.flip);
-    this.element = make("div", { className: "tools" }, this.section, this.measure, this.from, chamber, this.controls, this.told);
+    this.element = make("div", { className: "tools" }, this.section, this.measure, this.from, this.parallel, chamber, this.controls, this.told);
     this.ruler = new Measure(views, (text) => { this.told.textContent = text; });
-    for (const button of [this.section, this.measure]) button.setAttribute("aria-pressed", "false");
+    for (const button of [this.section, this.measure, this.parallel]) button.setAttribute("aria-pressed", "false");
     this.section.addEventListener("click", () => this.#turn(this.section.ariaPressed !== "true"));
     this.measure.addEventListener("click", () => this.#measure(this.measure.ariaPressed !== "true"));
     this.by.addEventListener("change", () => this.#begin());

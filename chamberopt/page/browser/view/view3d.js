@@ -6,6 +6,9 @@ const TEXT_PX = 15; // least height on the screen, so that a text is read in a s
 const OPACITY = { wall: 0.16, sonotrode: 0.9 }; // of the kinds that are seen through
 const FROM_BELOW = 0.08; // opacity of the sonotrode before the part
 const WIDE = 0.7; // width over height of a view that shows all, also what is as wide as its diagonal
+const LENS = 30, PARALLEL = 0.1; // degrees of the view from bottom to top; of an eye so far away that lines of sight are parallel
+const DEEP = 8; // sizes of what is looked at, before and behind its middle, within which all is drawn
+const halfOf = (lens) => Math.tan(lens * Math.PI / 360);
 const END_ON = 0.97; // cosine between sight and a dimension from which on it is not drawn
 class View3D {
   #meshes = new Map();
@@ -26,7 +29,7 @@ class View3D {
     renderer.setPixelRatio(devicePixelRatio);
     element.append(renderer.domElement);
     this.scene = new THREE.Scene();
-    this.camera = new THREE.PerspectiveCamera(30, 1, 1, 1000);
+    this.camera = new THREE.PerspectiveCamera(LENS, 1, 1, 1000);
     this.camera.up.set(0, 0, 1);
     const sun = new THREE.DirectionalLight(0xffffff, 0.9);
     sun.position.set(-0.4, 0.5, 1);
@@ -301,14 +304,29 @@ class View3D {
   }
 
   #aim({ middle, eye, size }) {
-    const far = Math.max(1, WIDE / this.camera.aspect);
+    const far = Math.max(1, WIDE / this.camera.aspect) * halfOf(LENS) / halfOf(this.camera.fov);
     this.orbit.target.set(...middle);
     this.camera.position.set(...middle.map((x, i) => x + far * (eye[i] - x)));
-    this.camera.near = size / 200;
-    this.camera.far = size * 20;
-    this.camera.updateProjectionMatrix();
     this.orbit.update();
     this.draw();
+  }
+
+  // Draw along parallel lines of sight, in which equal lengths are equal, or as the eye sees; what is in the middle keeps its size.
+  parallel(isOn) {
+    const { camera, orbit } = this, lens = isOn ? PARALLEL : LENS, nearer = halfOf(camera.fov) / halfOf(lens);
+    if (camera.fov === lens) return;
+    camera.fov = lens;
+    camera.position.sub(orbit.target).multiplyScalar(nearer).add(orbit.target);
+    orbit.update();
+    this.draw();
+  }
+
+  // Draw all that is about the middle, however far the eye is.
+  #reach() {
+    const { camera } = this, size = this.home?.size ?? 1, away = camera.position.distanceTo(this.orbit.target);
+    camera.near = Math.max(size / 200, away - DEEP * size);
+    camera.far = away + 2 * DEEP * size;
+    camera.updateProjectionMatrix();
   }
 
   // Look at all surfaces that are to be seen, from the side to which a way [x, y, z] leads, by default from where the eye is.
@@ -325,6 +343,7 @@ class View3D {
     other.#heard.push(() => {
       if (busy || this.camera.position.equals(other.camera.position)) return;
       busy = true;
+      this.camera.fov = other.camera.fov;
       this.camera.position.copy(other.camera.position);
       this.orbit.target.copy(other.orbit.target);
       this.orbit.update();
@@ -350,6 +369,7 @@ class View3D {
   #render() {
     if (!this.renderer.domElement.isConnected) return;
     this.section.refresh();
+    this.#reach();
     this.#tellKinds();
     this.#show();
     const { renderer, camera } = this, { clientWidth: width, clientHeight: height } = this.element, corner = 84;
@@ -372,8 +392,8 @@ class View3D {
       const { along } = mesh.userData, isEndOn = along && Math.abs(sight.dot(new THREE.Vector3(...along))) > END_ON;
       mesh.traverse((one) => { one.layers.set(isEndOn ? 1 : 0); }); // the camera sees the layer 0
     }
-    const usual = TEXT_HEIGHT * this.element.clientHeight / (2 * Math.tan(this.camera.fov * Math.PI / 360));
-    const height = Math.max(usual, TEXT_PX), scale = TEXT_HEIGHT * height / usual;
+    const usual = TEXT_HEIGHT * this.element.clientHeight / (2 * halfOf(LENS));
+    const height = Math.max(usual, TEXT_PX), scale = 2 * halfOf(this.camera.fov) * height / this.element.clientHeight;
     const texts = all.filter(({ userData, visible }) => userData.isText && visible).flatMap(({ children }) => children);
     for (const one of texts.sort((a, b) => b.renderOrder - a.renderOrder)) {
       one.scale.set(scale * one.scale.x / one.scale.y, scale, 1);

@@ -20,14 +20,15 @@ from chamberopt.coverage.metrics import NEVER, find_metric
 from chamberopt.coverage.stress_knowledge import BANDS
 from chamberopt.design.calibration import Calibration, LawCalibration, Misfit, law_metal
 from chamberopt.design.load import load_design
-from chamberopt.documents.comparison import comparison_end, comparison_lines
-from chamberopt.documents.wording import metric_label
+from chamberopt.documents.comparison import after_shorter_time, comparison_end, comparison_lines
+from chamberopt.documents.wording import metric_label, objective_label
 from chamberopt.page.acts import list_results
 from chamberopt.printers import terminal
 from chamberopt.results.arrays_file import ResultArrays
 from chamberopt.results.command_records import difference_record
-from chamberopt.results.compare.comparison import Comparison, compare
+from chamberopt.results.compare.comparison import Comparison, compare, coverage_after
 from chamberopt.results.compare.difference import MAX_TIME_RATIO, confidence_of_each, difference
+from chamberopt.results.load import load_result
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.workflows import comparison_folder
 from chamberopt.workflows.comparison_folder import write_comparison
@@ -352,8 +353,37 @@ def test_the_end_is_a_sentence_for_each_and_the_main_figures_in_words(
     assert all(mean.number(one) in shown for one in values)
     assert (f"{mean.number(gap.estimate, sign=True)} *" in shown) is (len(names) == 1)
     assert f"{mean.number(values[1])} *" in shown or len(names) == 1
-    sentences = [one for one in end if isinstance(one, str) and one.startswith((*names,))]
-    assert [one[0] for one in sentences] == [*names]
-    assert sentences[0].endswith("more than noise.")
+    sentences = [one for one in end if isinstance(one, str) and " better " in one]
+    if len(names) == 1:  # one sentence says which is better, and by how much
+        goal = objective_label("uniform_coverage")
+        (gap, *_), (low, high) = (
+            both.differences["uniform_coverage"],
+            both.metrics["uniform_coverage"],
+        )
+        change = goal.format(gap.estimate, sign=True).removeprefix("+")
+        better = f"b is better than a: the {goal.text} is higher by {change}"
+        assert sentences == [
+            f"{better} ({goal.format(high)} against {goal.format(low)}; 95 % intervals)."
+        ]
+    else:
+        assert len(sentences) + text.count("No difference is resolved between c and a: ") == 2
     assert "mean_coverage" not in text
     assert "mean_coverage" in terminal.text(comparison_end(both, True))
+
+
+def test_results_of_different_times_are_compared_after_the_shorter(tmp_path: Path) -> None:
+    """Dents come at a steady rate, so that the coverage after a time follows from its curve."""
+    short = left(tmp_path / "short", 60)
+    longer = plate(process__treatment_time_s=3.0 * PLATE.process.treatment_time_s)
+    long = left(tmp_path / "long", 60, seed=2, design=longer)
+    results = [load_result(short), load_result(long)]
+    seconds = results[0].design.process.treatment_time
+    at_once, after = (coverage_after(one, seconds) for one in results)
+    assert at_once.value == pytest.approx(results[0].metrics["mean_coverage"].value, rel=0.02)
+    assert after.value == pytest.approx(at_once.value, rel=0.1)
+    assert coverage_after(results[1], 1e9) is None
+    told, remedy = after_shorter_time(results, ("short", "long"))
+    assert told.endswith(f" after {seconds:g} s, the shorter of both treatment times.")
+    assert "simulate it again" in remedy
+    with pytest.raises(InputError, match="cannot be compared"):
+        compare([short, long])
