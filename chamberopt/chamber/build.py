@@ -12,7 +12,8 @@ Frame: metres, z up, mean sonotrode face at z = 0, chamber axis at x = y = 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -145,6 +146,12 @@ class Chamber:
         """Return the same chamber with the named zone of the part as its target."""
         return replace(self, part=replace(self.part, target=self.part.zones[zone]))
 
+    def with_notes(self, more: Iterable[str]) -> Chamber:
+        """Return the same chamber, and the same `mesh`, with more notes."""
+        noted = copy(self)
+        object.__setattr__(noted, "notes", (*self.notes, *more))
+        return noted
+
     def surfaces(self) -> dict[str, Chamber]:
         """Return the chamber with its own target, then with each zone as its target.
 
@@ -182,7 +189,7 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
             steps=tuple(steps),
         )
     _refuse_hidden_zones(chamber.part, chamber.exposed_area)
-    return replace(chamber, notes=(*chamber.notes, *_hidden_notes(chamber)))
+    return chamber.with_notes(_hidden_notes(chamber))
 
 
 def told_of_steps(texts: Mapping[str, Sequence[str]]) -> list[str]:
@@ -257,7 +264,6 @@ def _build_one(design: Design, target: np.ndarray | None) -> Chamber:
     on_part = traced.tags == TAG_PART
     _refuse_free_edges(design, room, traced.tags)
     _refuse_bare_floor(design, room, traced.tags)
-    _refuse_wide_swings(design, room, traced.tags)
     area = areas(room.vertices, room.triangles)
     exposed = np.bincount(traced.source[on_part], area[on_part], len(part.triangles))
     if design.part.target.reachable and target is None:
@@ -274,8 +280,9 @@ def _build_one(design: Design, target: np.ndarray | None) -> Chamber:
     surface = room.vertices, room.triangles, traced.tags, traced.source
     origin = tuple(notes), traced.fitting, design.chamber.sha256
     chamber = Chamber(*surface, volume, part, exposed, *origin, fixtures, design.turning_holder_tag)
+    _refuse_wide_swings(design, chamber.mesh)
     _refuse_idle_bore(design, chamber)
-    return replace(chamber, notes=(*notes, *_holding_notes(chamber)))
+    return chamber.with_notes(_holding_notes(chamber))
 
 
 def _misplaced(part: Part, shape: ShapeSurface, text: str) -> SurfaceError:
@@ -417,16 +424,15 @@ def _refuse_bare_floor(design: Design, room: SolidSurface, tags: np.ndarray) -> 
         )
 
 
-def _refuse_wide_swings(design: Design, room: SolidSurface, tags: np.ndarray) -> None:
+def _refuse_wide_swings(design: Design, mesh: TriangleMesh) -> None:
     """Raise InputError if a sonotrode's amplitude is too large for the walls beside its face.
 
     Args:
-        room: surface of the cavity.
-        tags: kind of surface of its triangles (part, sonotrode or wall), (k,).
+        mesh: surface of the cavity.
     """
-    from sim_core import TriangleMesh, largest_amplitude
+    from sim_core import largest_amplitude
 
-    mesh, ball = TriangleMesh(room.vertices, room.triangles, tags), min(design.shot.diameters)
+    ball = min(design.shot.diameters)
     for k, one in enumerate((design.sonotrode, *design.sonotrodes)):
         tag = further_sonotrode_tag(k - 1) if k else TAG_SONOTRODE
         limit, place, leaning = largest_amplitude(mesh, tag, 0.5 * ball)

@@ -65,10 +65,7 @@ def find_touch_points(
         chosen: marks the triangles whose points are wanted, (m,) bool; None for all. Their points
             do not depend on the choice.
     """
-    triangle, point, area = spread_points(mesh.vertices, mesh.triangles, spacing)
-    if chosen is not None:
-        rows = chosen[triangle]
-        triangle, point, area = triangle[rows], point[rows], area[rows]
+    triangle, point, area = spread_points(mesh.vertices, mesh.triangles, spacing, chosen)
     # Where the normals of all corners are equal there is nothing to interpolate.
     normal = np.ascontiguousarray(normals[triangle, 0])
     bent = np.flatnonzero((normals != normals[:, :1]).any(axis=(1, 2))[triangle])
@@ -79,12 +76,16 @@ def find_touch_points(
 
 
 def spread_points(
-    vertices: np.ndarray, triangles: np.ndarray, spacing: np.ndarray
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    spacing: np.ndarray,
+    chosen: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return points spread evenly over triangles.
 
     Args:
         spacing: distance between the points on each triangle [m], (m,).
+        chosen: as in `find_touch_points`.
     Returns:
         For each point its triangle (p,), its position [m] (p, 3), and the area [m²] for which it
         stands (p,).
@@ -92,9 +93,13 @@ def spread_points(
     size = areas(vertices, triangles)
     count = np.where(size > 0.0, np.maximum(np.ceil(size / spacing**2), 1.0), 0.0).astype(np.int64)
     triangle = np.repeat(np.arange(len(triangles)), count)
+    number = np.arange(len(triangle))
+    if chosen is not None:
+        number = np.flatnonzero(chosen[triangle])
+        triangle = triangle[number]
     # One sequence runs over all triangles. If it began again on each triangle, the points of a row
     # of similar triangles would lie on a few lines.
-    u, v = ((1.0 / 3.0 + np.arange(len(triangle))[:, None] * SEQUENCE_STEP) % 1.0).T
+    u, v = ((1.0 / 3.0 + number[:, None] * SEQUENCE_STEP) % 1.0).T
     point = on_triangles(vertices[triangles[triangle]], u, v)
     return triangle, point, (size / np.maximum(count, 1))[triangle]
 

@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -76,6 +76,17 @@ class StudyResult:
     # has its own.
     target: np.ndarray | None = None
     sensitivity: Sensitivity | None = None  # None if there are too few points for a model
+
+    _chambers: dict[int, Chamber] = field(default_factory=dict, repr=False, compare=False)
+
+    def chamber_of(self, one: ConfirmedCandidate) -> Chamber:
+        """Return the chamber of the start, the best or another confirmed candidate, built once."""
+        from chamberopt.chamber.build import build_chamber
+
+        number = one.candidate.number
+        if number not in self._chambers:
+            self._chambers[number] = build_chamber(one.design, self.target)
+        return self._chambers[number]
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -82,9 +82,8 @@ def optimise_study(
         except EndError as error:
             failed = [str(error)]
     with teller.step("writing and drawing"):
-        best = result.best.design
-        found = build_chamber(best, result.target)
-        warnings = teller.check(best, found, " of the best design")
+        found = result.chamber_of(result.best)
+        warnings = teller.check(result.best.design, found, " of the best design")
         remarks = failed + save_study(folder.path, result, advice, warnings, ranges)
     return Ended(result, chamber, advice, remarks, ranges)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.design.ranges import unknowns
 from chamberopt.documents.ranges import cost_text
@@ -76,7 +75,7 @@ def study_ranges(result: StudyResult, executor: Executor, teller: Teller) -> Stu
     total, ended = 2 * count * sum(map(len, groups)), 0
     with teller.step(STEP, total) as progress:
         for one, unknown in zip(compared, groups, strict=True):
-            chamber = build_chamber(one.design, result.target)
+            chamber = result.chamber_of(one)
 
             def tell(done: float, _: int, best: float | None, before: int = ended) -> None:
                 progress(before + done, total, best)

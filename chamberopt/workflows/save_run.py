@@ -7,7 +7,6 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from chamberopt.chamber.build import build_chamber
 from chamberopt.common.files import make_output_folder, whole_or_nothing
 from chamberopt.pictures.charts.study import convergence_picture, pareto_picture, slices_picture
 from chamberopt.pictures.charts.sweep import sweep_map
@@ -96,8 +95,7 @@ def save_study(
     folder = Path(folder)
 
     def complete(one: ConfirmedCandidate) -> CandidateResult:
-        chamber = build_chamber(one.design, study_result.target)
-        return complete_result(one.design, chamber, one.evaluation)
+        return complete_result(one.design, study_result.chamber_of(one), one.evaluation)
 
     # Start and best are completed in threads while the diagrams are drawn, to keep all cores busy.
     with ThreadPoolExecutor(2) as threads:

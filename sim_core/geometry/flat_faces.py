@@ -8,6 +8,7 @@ mesh do. They are therefore large inside and small along a curved border, and th
 the outline, not the mesh.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ ROUNDINGS = 4.0
 MIN_TRIANGLES = 3  # smallest flat face: two triangles are not worth a search for their outline
 LONE = -1  # flat face number of a triangle that belongs to none
 
+LONG_OUTLINE = 300  # segments from which on covering takes milliseconds
 MAX_PIECE_CORNERS = 6  # a piece with more corners is cut; 4 to 8 gave the same query times
 MAX_HALVINGS = 16  # the last square has 1e-5 of the flat face's size
 # An outline corner nearer than this [m] to the line of its neighbours is left out. The value is a
@@ -204,6 +206,9 @@ def cover_with_quadrangles(
 ) -> Quadrangles:
     """Cover the inside of each outline with few convex quadrangles.
 
+    The quadrangles of long outlines are remembered: a part raised or lowered in its chamber, as in
+    a search, keeps those of its horizontal faces.
+
     Args:
         segments: segments of all borders [m], shape (n, 2, 2). Loops of a border inside other loops
             of it are holes.
@@ -211,6 +216,32 @@ def cover_with_quadrangles(
         areas: area of the inside of each outline [m²], (k,). An outline that crosses itself has a
             different area, and is not covered.
     """
+    is_long = np.bincount(outline, minlength=len(areas)) >= LONG_OUTLINE
+    if not is_long.any():
+        return _cover(segments, outline, areas)
+    short = np.flatnonzero(~is_long)
+    rows = ~is_long[outline]
+    found = _cover(segments[rows], np.searchsorted(short, outline[rows]), areas[short])
+    corners, owner, covered = [found.corners], [short[found.outline]], np.zeros(len(areas), bool)
+    covered[short] = found.covered
+    for k in np.flatnonzero(is_long):
+        one = _cover_long(segments[outline == k].tobytes(), float(areas[k]))
+        corners.append(one.corners)
+        owner.append(np.full(len(one.corners), k))
+        covered[k] = one.covered[0]
+    in_order = np.argsort(np.concatenate(owner), kind="stable")
+    return Quadrangles(np.concatenate(corners)[in_order], np.concatenate(owner)[in_order], covered)
+
+
+@lru_cache(8)
+def _cover_long(segments: bytes, area: float) -> Quadrangles:
+    """Cover the inside of one outline, given by the bytes of its segments."""
+    ends = np.frombuffer(segments).reshape(-1, 2, 2)
+    return _cover(ends, np.zeros(len(ends), dtype=np.int64), np.array([area]))
+
+
+def _cover(segments: np.ndarray, outline: np.ndarray, areas: np.ndarray) -> Quadrangles:
+    """Cover outlines as `cover_with_quadrangles` does."""
     lines = shapely.multilinestrings(shapely.linestrings(segments), indices=outline)
     regions = shapely.simplify(shapely.build_area(lines), STRAIGHT)
     is_sound = ~shapely.is_empty(regions) & shapely.is_valid(regions)

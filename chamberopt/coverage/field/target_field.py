@@ -127,10 +127,18 @@ class TargetField:
         return float(np.sqrt(self.setting.gauge / np.pi))
 
     def with_largest_dent(self, diameter: float) -> TargetField:
-        """Return the field for dents up to another diameter [m], with the same points."""
+        """Return the field for dents up to another diameter [m], with the same points.
+
+        Windows that are measured already are not measured again: only the bands beside creases
+        depend on the dents.
+        """
         if diameter == self.setting.largest_dent:
             return self
-        return replace(self, setting=self.setting._replace(largest_dent=diameter))
+        other = replace(self, setting=self.setting._replace(largest_dent=diameter))
+        for name in {"gauge", "wide"} & set(vars(self)):
+            gauge: Gauge = vars(self)[name]
+            vars(other)[name] = replace(gauge, band=other._band(gauge.windows))
+        return other
 
     @cached_property
     def target_area(self) -> float:
@@ -178,10 +186,12 @@ class TargetField:
         windows = self.windows_round(points, radius, division)
         area = self.alike * window_areas(windows, self.surface)
         area[area == 0.0] = np.inf  # a window without touchable area stays bare
+        return Gauge(windows, area, self._band(windows))
+
+    def _band(self, windows: Windows) -> CreaseBand | None:
+        """Return the windows beside creases; None if there are none."""
         band = find_band(windows, self.creases, self.pieces, 0.5 * self.setting.largest_dent)
-        if band is not None:
-            band = band._replace(length=self.alike * band.length)
-        return Gauge(windows, area, band)
+        return None if band is None else band._replace(length=self.alike * band.length)
 
     def windows_round(
         self, points: Places, radius: float, division: np.ndarray | None = None

@@ -143,3 +143,10 @@ def test_a_floor_of_blocks_is_simulated_as_one_face(rigid, mesh) -> None:
         build_chamber(disc.changed({"sonotrode.face.diameter_mm": width - 0.01}))
     with pytest.raises(InputError, match="each of which has its own: not supported"):
         bent(made)
+
+
+def test_shares_are_measured_up_to_the_distance_that_the_message_allows(rigid) -> None:
+    farthest = 1000.0  # mm
+    assert bent(rigid, [[0.0, 1.2], [farthest, 0.9]]).sonotrode.amplitude_profile is not None
+    with pytest.raises(InputError, match=f"given 1001; allowed: 0 to {farthest:g} mm"):
+        bent(rigid, [[0.0, 1.2], [farthest + 1.0, 0.9]])

@@ -34,3 +34,14 @@ def test_an_opengl_library_without_a_driver_costs_the_picture_only(
     assert "libegl1" in remark
     assert "\n" not in remark
     assert not list(tmp_path.iterdir())
+
+
+def test_a_drawing_that_fails_costs_the_picture_only_and_one_line_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(subprocess_drawing, "missing_opengl", lambda: "")
+    with pytest.raises(TypeError) as raised:
+        float({})  # type: ignore[arg-type]
+    remark = subprocess_drawing.draw_in_subprocess(float, {}, tmp_path / "new.png")
+    assert remark == f"new.png skipped: drawing failed (TypeError: {raised.value})"
+    assert not list(tmp_path.iterdir())

@@ -87,6 +87,20 @@ def test_far_apart_is_two_places_and_the_smallest_are_counted_only(chamber: Cham
     assert found.line.endswith("; 3 elsewhere")
 
 
+@pytest.mark.parametrize(
+    ("gap", "others"), [(0.9, "the part's side and the wall"), (1.1, "the part's side and other")]
+)
+def test_a_ball_is_held_by_what_it_touches_within_the_contact_gap(
+    chamber: Chamber, gap: float, others: str
+) -> None:
+    place = 8.5 - 1e3 * gap * 2e-5  # the part ends at 7 mm and the wall is at 10 mm
+    found = find_resting_balls(
+        resting(([place, 0.0, 0.0], 0.2, -1, -1, True)), [BALL] * 20, chamber, part_turns=False
+    )
+    assert found is not None
+    assert f"1 jammed between {others}" in found.line
+
+
 def test_between_other_balls_only(chamber: Chamber) -> None:
     found = find_resting_balls(
         resting(([0.0, 0.0, 8.0], 0.2, -1, -1, True)), [BALL] * 20, chamber, part_turns=False

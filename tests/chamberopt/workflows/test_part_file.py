@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -109,3 +110,11 @@ def test_other_mistakes_are_named(
         call(tmp_path)
     assert [one.name for one in tmp_path.iterdir()] == ["there.ply"]
     assert (tmp_path / "there.ply").read_bytes() == there
+
+
+@pytest.mark.parametrize("name", ["points", "regular_faces", "vertices", "faces"])
+def test_what_has_half_of_what_a_mesh_has_is_refused(name: str, tmp_path: Path) -> None:
+    half = SimpleNamespace(**{name: np.zeros((3, 3), dtype=int)})
+    with pytest.raises(InputError, match=r"given SimpleNamespace; give a trimesh\.Trimesh or"):
+        write_part(half, tmp_path / "part.ply", "mm")
+    assert not list(tmp_path.iterdir())

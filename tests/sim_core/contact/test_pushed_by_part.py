@@ -23,9 +23,12 @@ from sim_core import (
     pack_balls,
     simulate,
 )
-from sim_core.effects.contact_mode import ASLEEP
+from sim_core.contact.pushed_by_part import drop_pressed_balls
+from sim_core.contact.supports import add_support
+from sim_core.effects.contact_mode import ASLEEP, MAX_SUPPORTS, ON_BALL
 from sim_core.effects.gravity import STANDARD as G
 from sim_core.loop.simulate import Simulation
+from sim_core.numerics.vec3 import Vec3
 from sim_core.scene.invariants import clearance, closest_pair
 from tests.helpers.jit_on_and_off import with_and_without_jit
 from tests.helpers.scenes.cavities import SIDES, box_around
@@ -294,3 +297,25 @@ def test_the_same_bits_with_the_jit_on_and_off() -> None:
     assert int(answers[0].split()[0]) > 5
     assert int(answers[0].split()[1]) > 0
     assert answers[0] == answers[1]
+
+
+@pytest.mark.parametrize("count", range(MAX_SUPPORTS + 1))
+def test_a_push_drops_the_balls_in_its_way_and_no_support_of_another_ball(count: int) -> None:
+    """Up to four supports, from above and below in turn; the second one is a wall."""
+    turn = PartRotation(PART, rpm=1.0)
+    run = Simulation(Scene(paddle(), on_floor([[0.01, 0.01], [-0.01, 0.01]]), physics(turn), 1.0))
+    contact, middle, up = run.state.contact, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 1.0)
+    assert contact is not None
+    supports = contact.supports
+    under = [ON_BALL - 5, 7, ON_BALL - 6, ON_BALL - 7]
+    normals = [Vec3(0.0, 0.0, -1.0 if k % 2 else 1.0) for k in range(MAX_SUPPORTS)]
+    for k in range(MAX_SUPPORTS):
+        add_support(supports, 1, ON_BALL - 9, Vec3(0.0, 0.0, -1.0), middle, 1.0)
+        if k < count:
+            add_support(supports, 0, under[k], normals[k], middle, 1.0)
+    for push, stay in ((up, [0, 1, 2]), (Vec3(0.0, 0.0, -1.0), [1])):
+        drop_pressed_balls(contact, 0, push)
+        left = supports.obstacles[0, : supports.number[0]].tolist()
+        assert left == [under[k] for k in stay if k < count]
+    assert supports.number[1] == MAX_SUPPORTS
+    assert (supports.obstacles[1] == ON_BALL - 9).all()

@@ -11,7 +11,13 @@ import trimesh
 from sim_core import Balls, Gravity, Physics, Scene, TriangleMesh, simulate
 from sim_core.detect.ball_mesh import first_contact, new_scratch
 from sim_core.geometry import flat_faces
-from sim_core.geometry.flat_faces import LONE, FlatFaces, Quadrangles, cover_with_quadrangles
+from sim_core.geometry.flat_faces import (
+    LONE,
+    LONG_OUTLINE,
+    FlatFaces,
+    Quadrangles,
+    cover_with_quadrangles,
+)
 from sim_core.geometry.obstacle_set import ObstacleSet, build_obstacle_set
 from sim_core.numerics.vec3 import Flight, Vec3
 from sim_core.scene.invariants import clearance, contained
@@ -146,16 +152,21 @@ def test_a_convex_outline_of_few_corners_is_a_fan() -> None:
         assert shapely.area(shapely.polygons(found.corners)).sum() == pytest.approx(area)
 
 
-def test_outlines_are_covered_together_as_each_alone() -> None:
+@pytest.mark.parametrize("corners", [60, LONG_OUTLINE])
+def test_outlines_are_covered_together_as_each_alone(corners: int) -> None:
+    star = some_star(4, corners)
     outlines = [
-        outline(some_star(4, 60).tolist(), HOLE.tolist()),
+        outline(star.tolist(), HOLE.tolist()),
         outline([(0, 0), (1, 1), (1, 0), (0, 1)]),  # crosses itself
         outline(HOLE.tolist()),
         outline([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]),
     ]
-    areas = [shapely.Polygon(some_star(4, 60), [HOLE]).area, 1.0, 0.09, 3.0]
+    outlines.append(2.0 * outlines[0])
+    areas = [shapely.Polygon(star, [HOLE]).area, 1.0, 0.09, 3.0]
+    areas.append(4.0 * areas[0])
     whole = cover(*outlines, areas=areas)
-    assert whole.covered.tolist() == [True, False, True, True]
+    assert whole.covered.tolist() == [True, False, True, True, True]
+    assert (np.diff(whole.outline) >= 0).all()
     for k, one in enumerate(outlines):
         alone = cover(one, areas=[areas[k]])
         np.testing.assert_array_equal(alone.corners, whole.corners[whole.outline == k])

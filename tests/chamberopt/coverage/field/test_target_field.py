@@ -189,3 +189,20 @@ def test_some_points_are_spread_over_all() -> None:
     counts, _, _ = np.histogram2d(some.place[:, 0], some.place[:, 1], bins=5)
     assert counts.std() < 4.5  # 20 on average: at random 4.5
     assert len(field.some_points(10**7).place) == len(field.touched.place)
+
+
+def test_windows_of_other_dents_are_the_same_and_their_bands_those_of_a_new_field() -> None:
+    chamber = chamber_round(trimesh.creation.box((0.01, 0.01, 0.01)))
+    dents, wider = 0.2e-3, 0.5e-3
+    field, new = (field_of(chamber, points=2000, dent=dent) for dent in (dents, wider))
+    measured = field.gauge
+    other = field.with_largest_dent(wider).gauge
+    assert np.array_equal(other.area, new.gauge.area)
+    assert np.array_equal(other.area, measured.area)
+    bands = [one.band for one in (measured, other, new.gauge)]
+    assert all(bands)
+    before, now, wanted = bands
+    assert len(now.point) > len(before.point)
+    for column in ("point", "height", "length"):
+        assert np.array_equal(getattr(now, column), getattr(wanted, column))
+    assert field.with_largest_dent(dents) is field
