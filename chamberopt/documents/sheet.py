@@ -386,7 +386,7 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     face = design.sonotrode.face
     if face is not None:
         alike = ", driven alike: simulated as one face" if face.count > 1 else ""
-        yield "take", f"{face.in_words}{alike}"
+        yield "stands on", f"{face.in_words}{alike}"
     yield "face in the chamber", _size(face_mm)
     if face is not None and face.count > 1:
         gap = plain(1e3 * WIDEST_GAP * min(design.ball_diameters), 3)

@@ -389,7 +389,7 @@ def _draw_face(axes: Axes, chamber: Chamber, view: View, face: Face) -> list[str
     found = ["the joints of the floor's blocks"] if face.count > 1 else []
     if (np.array(face.sides_mm) > np.ptp(area.vertices, axis=0) + WIDER).any():
         rim = view.place(1e3 * face.outline[[*range(len(face.outline)), 0]])
-        (line,) = axes.plot(*rim.T, color=SONOTRODE, **look)
+        (line,) = axes.plot(*rim.T, color=SONOTRODE, zorder=0.5, **look)  # below words
         (left, foot), (right, top) = view.place(np.array([view.low, view.high]))
         size = right - left + 2.0 * BESIDE, top - foot + 2.0 * BESIDE
         line.set_clip_path(
@@ -419,4 +419,4 @@ def _lines(axes: Axes, view: View, lines: np.ndarray, colour: str, width: float)
 
 
 def _label(axes: Axes, x: float, y: float, text: str) -> None:
-    axes.text(x, y, text, size=6.5, color=DARK_GREY, va="bottom")
+    axes.text(x, y, text, size=6.5, color=DARK_GREY, va="bottom", bbox=LABEL)
