@@ -12,6 +12,7 @@ from chamberopt.common.estimate import ZERO_TOLERANCE, Estimate
 
 NEARLY_ALL = 1e-3  # words replace shares that are closer to 1
 MOST_NINES = 6
+ALIKE = 1e-9  # distance of the ends of a range over their size, below which it is rounding
 THIN_SPACE = "\u202f"  # gap between thousands, at which no line breaks
 
 
@@ -151,7 +152,8 @@ def range_text(low: float, high: float, unit: str = "") -> str:
     Both have the decimals that the half of their distance would have as an interval.
     """
     half_width = 0.5 * abs(high - low)
-    if not math.isfinite(half_width) or half_width < ZERO_TOLERANCE:
+    least = max(ZERO_TOLERANCE, ALIKE * max(abs(low), abs(high)))
+    if not math.isfinite(half_width) or half_width < least:
         ends = [plain(low), plain(high)]
     else:
         decimals = _decimals(half_width)

@@ -105,6 +105,7 @@ def answer_lines(result: Result, start: Result | None = None) -> list[AnswerLine
     lines = [*time_lines(result), *range_answer(result)]
     lines += intensity_lines(result.design, result.metrics)
     lines += [
+        *_ended_lines(result),
         *_softer_lines(result, start),
         *step_lines(result),
         *zone_lines(result),
@@ -115,6 +116,26 @@ def answer_lines(result: Result, start: Result | None = None) -> list[AnswerLine
     return lines + [
         AnswerLine("calibration", f"{one[0].upper()}{one[1:]}.", True) for one in doubts if one
     ]
+
+
+def _ended_lines(result: Result) -> Iterator[AnswerLine]:
+    """Yield a sentence on a search that ended before its evaluations were spent, and what to ask.
+
+    It ends as soon as nothing within its bounds can be better by as much as counts.
+    """
+    study = result.study
+    if study is None or study.ended_by != "gain" or study.possible_gain is None:
+        return
+    label, treatment = objective_label(result.objective_name), result.design.process.treatment_time
+    most = label.format(Estimate(study.possible_gain, 0.0)).removeprefix("−")
+    text = (
+        f"The search ended after {study.evaluations} chambers: between its bounds none can be "
+        f"better than the best by more than {most} (95 % sure)"
+    )
+    time = result.metrics.get("time_to_98_s")
+    if time is not None and time.has_number and time.high < treatment:
+        text += f"; all is covered within {plain(treatment)} s: ask for the shortest time instead"
+    yield AnswerLine("best", f"{text}.", False)
 
 
 def _softer_lines(result: Result, start: Result | None) -> Iterator[AnswerLine]:

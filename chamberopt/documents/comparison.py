@@ -42,6 +42,8 @@ def summary(comparison: Comparison) -> list[Table | str]:
     labels = labels_of(goal, comparison.metrics)
     shown = [(name, labels[name]) for name in main_names(goal, labels)]
     sentences = [_sentence(comparison, *shown[0], k) for k in range(len(later))] if shown else []
+    if not comparison.parameters:
+        sentences.append("No number of the designs differs: they were simulated again.")
     several = len(later) > 1
     rows = [
         [name, *map(_shown, values), *[""] * (not several)]

@@ -126,7 +126,8 @@ def cautions(result: Result) -> Iterator[str]:
         )
     if result.record.chamber.pieces_in_air:
         yield "The part is held in the air: nothing holds it, a holder of the design would."
-    if ends := result.study.on_bounds if result.study else []:
+    study = result.study
+    if ends := study.on_bounds if study and not study.keeps_start else []:
         yield (
             f"The search ended on its bounds of {', '.join(map(key_in_words, ends))}: a better "
             "chamber may lie beyond."

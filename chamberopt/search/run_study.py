@@ -17,6 +17,7 @@ from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError, WorkerLostError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
 from chamberopt.common.files import write_text
+from chamberopt.common.number_text import rounded
 from chamberopt.common.progress import Progress
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.load import save_design
@@ -135,8 +136,9 @@ class StudyResult:
         if time is None or not time.has_number or not time.high < treatment:
             return "vary other parameters, or widen [vary]"
         return (
-            f"it has full coverage after {time.value:.2g} of {treatment:g} s: ask for the shortest "
-            "time (objective minus_treatment_time_s), or how little shot or amplitude will do"
+            f"it has full coverage after {rounded(time.value, 2)} of {treatment:g} s: ask for the "
+            "shortest time (objective minus_treatment_time_s), or how little shot or amplitude "
+            "will do"
         )
 
     @property

@@ -17,7 +17,10 @@ export function fillRun() {
   const aim = find("aim").value;
   find("aim").replaceChildren(...state.file.aims.map(([value, textContent]) => element("option", { value, textContent })));
   if (aim) find("aim").value = aim;
-  else takeQuestion(state.file.files.find((one) => one.asks)); // the page is new: what was proposed is a start
+  else { // the page is new: what was proposed is a start, the usual aim first
+    const studies = state.file.files.filter((one) => one.asks), [[usual] = []] = state.file.aims;
+    takeQuestion(studies.find((one) => one.asks.aim === usual) ?? studies[0]);
+  }
   allow();
   tellDuration();
   showVaried();

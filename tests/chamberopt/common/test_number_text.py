@@ -3,7 +3,7 @@
 import pytest
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.number_text import percent, plain, share_in_words
+from chamberopt.common.number_text import percent, plain, range_text, share_in_words
 
 
 @pytest.mark.parametrize(
@@ -36,3 +36,8 @@ def test_words_for_a_share_claim_no_more_than_its_interval(half_width: float) ->
     if words:
         claimed = float(words.removeprefix("more than ").removesuffix(" %")) / 100.0
         assert 1.0 - 10.0 * half_width < claimed <= 1.0 - half_width  # and at most a nine less
+
+
+def test_ends_of_a_range_that_rounding_alone_parts_are_one_number() -> None:
+    assert range_text(99.9999999999979, 100.0, "%") == "100 %"
+    assert range_text(0.997, 1.0) == "0.9970 to 1.0000"

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.documents.answer import answer, answer_lines
+from chamberopt.documents.answer import _ended_lines, answer, answer_lines
 from chamberopt.documents.study import influence_sentences, influences, tried_sentence
 from chamberopt.documents.wording import Label, objective_label
 from chamberopt.results.records import (
@@ -200,3 +200,19 @@ def test_what_is_not_resolved_is_not_in_the_answer_as_a_number() -> None:
         "Too few dents were simulated to tell how much of the target is covered after 120 s."
     )
     assert answer(result, result).startswith("Too few dents were simulated to tell wheth")
+
+
+@pytest.mark.parametrize(("by", "time"), [("gain", 800.0), ("gain", 1300.0), ("budget", 800.0)])
+def test_a_search_that_has_nothing_to_gain_says_so_in_the_answer(by: str, time: float) -> None:
+    """A treatment of 1200 s, in which all is covered or not."""
+    found: Any = SimpleNamespace(
+        study=a_study(evaluations=2, ended_by=by, possible_gain=0.009),
+        objective_name="uniform_coverage",
+        metrics={"time_to_98_s": Estimate(time, 20.0)},
+        design=SimpleNamespace(process=SimpleNamespace(treatment_time=1200.0)),
+    )
+    lines = [one.text for one in _ended_lines(found)]
+    assert len(lines) == (by == "gain")
+    assert all("ended after 2 chambers: between its bounds" in text for text in lines)
+    assert all("by more than 0.009 (95 % sure)" in text for text in lines)
+    assert [("ask for the shortest time" in text) for text in lines] == [time < 1200.0] * len(lines)
