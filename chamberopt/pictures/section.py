@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -22,8 +23,11 @@ SAME = 0.02  # mm: lengths that differ by less count as equal
 FEWEST_CORNERS = 8  # of a face that is drawn as round
 TRIED = 16  # planes in each direction
 ENOUGH = 0.8  # share of the part's outline that one section must show; below it there are two
-AREA = 0.2  # weight of the area of the cut beside its span, for planes of the same span
-AS_GOOD = 0.9  # of the best plane's score: then the plane through the chamber's axis is taken
+# Weights of the area of the cut, and of the line of the target in it, beside its span.
+AREA, OUTLINE = 0.5, 0.5
+# Share of a score that counts off the chamber's axis, and of the best score from which on the plane
+# along the longer side is taken.
+AS_GOOD = 0.9
 
 
 @dataclass(frozen=True)
@@ -51,31 +55,36 @@ def section_planes(chamber: Chamber) -> list[SectionPlane]:
     found = [_planes(chamber, right) for right in (longer, 1 - longer)]
     showing = [[one for one in planes if one.target] for planes in found]
     found = [planes for planes in showing if planes] or found
-    largest = max(one.area for planes in found for one in planes) or 1.0
-    best = [_best_plane(planes, largest) for planes in found]
+    cuts = [one for planes in found for one in planes]
+    most = max(one.area for one in cuts) or 1.0, max(one.target for one in cuts) or 1.0
+    best = [_best_plane(planes, most) for planes in found]
     top = max(score for _, score in best)
     planes = [plane for plane, _ in sorted(best, key=lambda one: one[1] < AS_GOOD * top)]
     return planes[: 1 if planes[0].span >= ENOUGH else 2]
 
 
 class _Cut(NamedTuple):
-    """A plane, the area of the part in it [m²], and whether it meets the target."""
+    """A plane, the area of the part in it [m²], and the length of the target's line there [m]."""
 
     plane: SectionPlane
     area: float
-    target: bool
+    target: float
 
 
-def _best_plane(planes: list[_Cut], largest: float) -> tuple[SectionPlane, float]:
-    """Return the best of parallel planes with its score: the first if it is about as good.
+def _best_plane(planes: list[_Cut], most: tuple[float, float]) -> tuple[SectionPlane, float]:
+    """Return the best of parallel planes with its score, of which the first has an advantage.
 
     Args:
         planes: the planes.
-        largest: largest of all these areas, and of those of the planes across.
+        most: largest of all areas and lengths, also of the planes across.
     """
-    scored = [(one.plane, one.plane.span + AREA * one.area / largest) for one in planes]
-    best = max(scored, key=lambda one: one[1])
-    return scored[0] if scored[0][1] >= AS_GOOD * best[1] else best
+    area, length = most
+    scored = [
+        (one.plane, one.plane.span + AREA * one.area / area + OUTLINE * one.target / length)
+        for one in planes
+    ]
+    first, *others = scored
+    return max([first, *((plane, AS_GOOD * score) for plane, score in others)], key=itemgetter(1))
 
 
 def _planes(chamber: Chamber, right: int) -> list[_Cut]:
@@ -98,7 +107,8 @@ def _planes(chamber: Chamber, right: int) -> list[_Cut]:
         (x1, y1), (x2, y2) = lines[:, 0].T, lines[:, 1].T
         area = 0.5 * abs(float(np.sum(x1 * y2 - x2 * y1)))
         plane = SectionPlane(right, 1e3 * float(at), span)
-        found.append(_Cut(plane, area, bool(part.target[cut_ones].any())))
+        on_target = np.linalg.norm(np.diff(lines[part.target[cut_ones]], axis=1), axis=2)
+        found.append(_Cut(plane, area, float(on_target.sum())))
     return found
 
 

@@ -301,6 +301,16 @@ def test_the_section_shows_the_target() -> None:
     assert plane.right == 1
 
 
+def test_the_section_shows_the_profile_that_is_peened() -> None:
+    """Four ribs along y, the longer side: a plane along them shows a block."""
+    bounds = [((-15e-3, -17e-3, 0.0), (15e-3, 17e-3, 10e-3))]
+    bounds += [((x, -17e-3, -8e-3), (x + 4e-3, 17e-3, 1e-3)) for x in 1e-3 * np.arange(-14, 13, 8)]
+    comb = trimesh.boolean.union([trimesh.creation.box(bounds=one) for one in bounds])
+    below = comb.triangles_center[:, 2] < 1e-9
+    chamber = chamber_round(comb, below)
+    assert [one.right for one in section_planes(chamber)] == [0]
+
+
 def test_the_section_shows_the_part() -> None:
     """One plane along a bar beside the axis; two for bars across each other, apart."""
     bar = trimesh.creation.box((40e-3, 4e-3, 4e-3))
