@@ -53,6 +53,7 @@ async function show() {
   find("shown").innerHTML = html; // the server's own, as in a report; names in it are escaped
   find("shown").prepend(element("div", { id: "stale" }));
   find("shown").hidden = find("close-results").hidden = false;
+  find("shown").scrollTop = 0; // where the one before was scrolled to says nothing of this one
   if (longer.times) find("stale").after(element("p", {}, simulateLonger(longer)));
   views = showParts(content);
   await refresh();
