@@ -113,7 +113,7 @@ def test_a_section_is_filled_in_the_colours_of_the_legend(opened: Page) -> None:
     page, legend = opened.page, opened.page.locator("#legend")
     page.click(".tools >> text=Section")
     page.select_option(".tools select", "x")
-    expect(page.locator(".tools input[type=number]")).to_have_value(re.compile(r"^-?\d+(\.\d\d?)?$"))
+    expect(page.locator(".tools input[type=number]")).to_have_value("0")
     page.select_option(".tools select", "z")
     page.fill(".tools input[type=number]", "20")
     kinds = ["not in the target", "target", "sonotrode", "chamber wall"]
@@ -562,6 +562,11 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     expect(page.locator("#message")).to_contain_text("written: stopped.toml")
     expect(page.locator("#lasts")).to_be_hidden()  # while it runs
     expect(page.locator("#study-progress")).to_contain_text("at work for")
+    opened.tab("results")
+    expect(page.locator("#study-view")).to_be_hidden()
+    expect(page.locator("#make-later")).to_be_visible()
+    opened.tab("run")
+    expect(page.locator("#study-view")).to_be_visible()
     page.click("#study-stop")
     expect(page.locator("#progress")).to_contain_text("stopped", timeout=WAIT)
     expect(page.locator("#study-progress")).to_be_empty()
