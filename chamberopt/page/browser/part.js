@@ -95,7 +95,7 @@ function showParts({ quantities, scenes, scales, kinds }) {
     panels[i].append(stage);
     const view = new View3D(stage);
     view.kinds = kinds;
-    for (const [name, surface] of Object.entries(scene.surfaces))
+    for (const [name, surface] of Object.entries(scene.surfaces)) if (name === "part" || surface.triangles.length)
       view.surface(name, { ...surface, scale: name === "part", open: SOLID.includes(name) && !scene.whole });
     view.lines("edges", new Float32Array(bytes(scene.edges.ends)), scene.edges.colour, "wall");
     view.look(scene.view);
