@@ -12,7 +12,13 @@ import numpy as np
 
 from chamberopt.chamber.bores_and_deflectors import on_deflectors
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.check import first_warnings, matters, notes, shot_reach
+from chamberopt.chamber.checks.check import (
+    first_warnings,
+    is_of_unpeened,
+    matters,
+    notes,
+    shot_reach,
+)
 from chamberopt.chamber.checks.facts import describe, first_facts, with_clearance
 from chamberopt.chamber.part import chosen_on_part, chosen_triangles, named_surface, preview_part
 from chamberopt.chamber.propose.proposed_target import (
@@ -152,7 +158,7 @@ def check_answers(design: Design, step: int = 0) -> Iterator[bytes]:
     head: dict[str, Any] = {
         "facts": _facts(design, with_clearance(first_facts(design, whole), mesh)),
         "notes": [on_page(text) for text in notes(design, whole)],
-        "warnings": _warnings(design, first_warnings(design, whole, mesh)),
+        **_warnings(design, first_warnings(design, whole, mesh)),
     }
     part = chamber.part
     chosen = {name: chosen_on_part(one, at, f"{name}.at") for name, at in _fixture_faces(one)}
@@ -170,15 +176,22 @@ def check_answers(design: Design, step: int = 0) -> Iterator[bytes]:
     head = {
         "facts": _facts(design, found),
         "notes": [on_page(text) for text in found["notes"]],
-        "warnings": _warnings(design, found["warnings"]),
+        **_warnings(design, found["warnings"]),
     }
     yield packed(head, state=state)
 
 
-def _warnings(design: Design, texts: Sequence[str]) -> list[Words]:
-    """Return warnings in words, without what is to be settled, of which the page has a list."""
+def _warnings(design: Design, texts: Sequence[str]) -> dict[str, list[Words]]:
+    """Return warnings in words: those that the page shows first, and the others.
+
+    What is to be settled is not among them: the page has a list of it.
+    """
     known = matters(design)
-    return [on_page(text) for text in texts if text not in known]
+    own = [text for text in texts if text not in known]
+    return {
+        "unpeened": [on_page(text) for text in own if is_of_unpeened(text)],
+        "warnings": [on_page(text) for text in own if not is_of_unpeened(text)],
+    }
 
 
 def _facts(design: Design, found: Mapping[str, Any]) -> list[tuple[str, list[Words]]]:

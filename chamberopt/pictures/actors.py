@@ -23,7 +23,7 @@ from chamberopt.pictures.drawn_part import DrawnPart
 from chamberopt.results.vtp_files import Surface, fixture_marks, pyvista
 
 DARK, BACKGROUND = "#2b3440", "white"
-FAULT, PALE = "#d01c1c", "#eceff2"
+FAULT, PALE = "#d01c1c", "#c8b0dc"
 SHARP_EDGE = 30  # degrees between the triangles at an edge that is drawn
 ROUND_STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # of colour bars, times powers of ten
 LIFT = 0.1  # height of discs over the surface, in radii, so that facets of an edge hide no disc

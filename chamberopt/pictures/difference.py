@@ -10,7 +10,7 @@ import numpy as np
 
 from chamberopt.pictures.actors import NO_RENDER
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, seen_area
-from chamberopt.pictures.charts.colours import DIFFERENCE_MAP, FEW_DENTS
+from chamberopt.pictures.charts.colours import DIFFERENCE_MAP, FEW_TO_TELL
 from chamberopt.pictures.panels import near_panels
 from chamberopt.pictures.picture_page import ColourBar, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess
@@ -115,7 +115,7 @@ def render_difference(job: dict[str, Any]) -> None:
         drawn.append(k)
     legend = [(PALE, "within the noise"), (NO_TARGET, "not in the target")]
     if not all((np.asarray(target[f"told_{k}"])[used] > 0).all() for k in drawn):
-        legend.insert(1, (FEW_DENTS, "too few simulated dents to tell"))
+        legend.insert(1, (FEW_TO_TELL, "too few simulated dents to tell"))
     bar = ColourBar("difference of coverage [%-points]", DIFFERENCE_MAP, (-limit, limit), "both")
     write_page(job["picture"], rows, legend, bar, alike)
 
@@ -128,7 +128,7 @@ def _add_difference(plotter: Any, target: Surface, rest: Surface, k: int, limit:
     same, shown = target.clip_scalar(scalars=f"real_{k}", value=0.5, both=True)
     if same.n_cells:
         few, noise = same.clip_scalar(scalars=f"told_{k}", value=0.5, both=True)
-        for surface, colour in ((few, FEW_DENTS), (noise, PALE)):
+        for surface, colour in ((few, FEW_TO_TELL), (noise, PALE)):
             if surface.n_cells:
                 plotter.add_mesh(surface, color=colour, **look)
     if shown.n_cells:

@@ -19,6 +19,7 @@ from chamberopt.chamber.checks.calibration import calibration_warnings
 from chamberopt.chamber.checks.fillets import facet_warnings, fillet_warnings
 from chamberopt.chamber.checks.gaps import (
     MIN_MISSED_SHARE,
+    UNTOUCHED,
     find_ledges,
     gap_warnings,
     gutter_warnings,
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
 # finds no places to start from.
 MAX_PACKING_FRACTION = 0.2
 MIN_AMPLITUDES = 10.0  # between part and sonotrode, as for sonotrode_distance_mm of a design
+HIDDEN = "is outside the chamber and counts as not covered"
 MAX_HIDDEN_SHARE = 0.05  # of the target's area; a larger share means a misplaced ceiling or wall
 DOWN = 0.9  # cosine to the way down from which on a face that was level looks at the sonotrode
 MIN_MASKED = 1e-4  # share of the target under a mask that is worth a warning
@@ -118,6 +120,11 @@ def _wall_warnings(
     return [*gaps, *pocket_warnings(reach, chamber), *gutters]
 
 
+def is_of_unpeened(warning: str) -> bool:
+    """Return True for a warning that some of the target or of a zone is not peened at all."""
+    return HIDDEN in warning or UNTOUCHED in warning
+
+
 def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
     """Return the warnings of each step, and one on what no ball can touch in any of them.
 
@@ -148,7 +155,7 @@ def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
         left, whole = float((part.area - shares)[rows].sum()), float(part.area[rows].sum())
         if left > MIN_MISSED_SHARE * whole and not design.part.target.reachable:
             texts.append(
-                f"{left / whole:.1%} of {name} ({mm2(left)}) cannot be touched by a ball of "
+                f"{left / whole:.1%} of {name} ({mm2(left)}) {UNTOUCHED} "
                 f"{' or '.join(sorted(balls))} mm in any step, however long it is peened: add a "
                 f"step in another pose, or narrow {selection_of(name)}"
             )
@@ -182,9 +189,8 @@ def first_warnings(
     for name, surface in _to_be_peened(design, chamber).items() if of_surfaces else ():
         if (hidden := hidden_share(surface)) > MAX_HIDDEN_SHARE:
             texts.append(
-                f"{hidden:.0%} of the area of {name} is outside the chamber and counts as not "
-                f"covered: enlarge the chamber, or narrow {selection_of(name)} to what is to be "
-                "peened"
+                f"{hidden:.0%} of the area of {name} {HIDDEN}: enlarge the chamber, or narrow "
+                f"{selection_of(name)} to what is to be peened"
             )
     texts += _mask_warnings(chamber)
     texts += _side_wall_warnings(design, chamber)

@@ -54,6 +54,7 @@ if TYPE_CHECKING:
 
 MAX_WARNINGS = 4  # of one kind
 MIN_MISSED_SHARE = 0.005  # share of the target that is worth a warning
+UNTOUCHED = "cannot be touched by a ball of"
 
 MIN_FREE = 0.1  # ball diameters: smaller balls are no remedy
 NEW_SHAPE, CLOSED = "change the chamber's shape", "close it where it is not to be peened"
@@ -150,8 +151,8 @@ def surface_warnings(
         diameter_mm = 2e3 * float(touches.radius[own][order][np.argmax(second_half)])
         remedy = f"balls of {diameter_mm:.2g} mm would fit half of that; or {remedy}"
     return [
-        f"{left / whole:.1%} of {name} in the chamber ({mm2(left)}) cannot be touched by a "
-        f"ball of {1e3 * reach.diameter:g} mm, however long it is peened: e.g. at {place} in "
+        f"{left / whole:.1%} of {name} in the chamber ({mm2(left)}) {UNTOUCHED} "
+        f"{1e3 * reach.diameter:g} mm, however long it is peened: e.g. at {place} in "
         f"the chamber's frame; {remedy}"
     ]
 

@@ -137,8 +137,9 @@ function fillSettle() {
   find("settle").replaceChildren(...rows.length ? [element("h2", { textContent: "To be settled before it is built" }), list] : []);
 }
 
-function sayOf({ facts, warnings, notes }) {
+function sayOf({ facts, unpeened, warnings, notes }) {
   const list = (texts) => texts.map((text) => element("li", {}, ...onPage(text)));
+  find("unpeened").replaceChildren(...unpeened.map((words) => element("p", { className: "warning" }, ...onPage(words))));
   find("warnings").replaceChildren(...warnings.map(warning));
   find("notes").replaceChildren(...list(notes));
   find("facts").replaceChildren(...facts.flatMap(([subject, told]) => [element("dt", { textContent: subject[0].toUpperCase() + subject.slice(1) }),

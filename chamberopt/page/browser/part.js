@@ -33,7 +33,8 @@ function showParts({ quantities, scenes, scales, kinds }) {
   }
 
   // Range of the colours: of coverage that of the pictures at the treatment time, and all at another time; if fitted, and
-  // of what is no share, 1st to 99th percentile of all results, widened to round numbers.
+  // of what is no share, 1st to 99th percentile of all results, widened to round numbers, which 0 may be, but
+  // for times: no place is covered at once.
   function range(all) {
     if (chosen().unit === "%" && !controls.fit.checked) {
       const isTreated = scenes.every(({ treatment }) => Math.abs(seconds() - treatment) < 1e-3 * treatment);
@@ -44,8 +45,8 @@ function showParts({ quantities, scenes, scales, kinds }) {
     const at = (share) => known[Math.round(share * (known.length - 1))];
     let [low, high] = [at(0.01), at(0.99)];
     const span = high > low ? high - low : Math.max(Math.abs(high), 1e-9);
-    const step = 10 ** Math.floor(Math.log10(span)) / 2;
-    low = low >= 0 && low < 0.4 * high ? 0 : step * Math.floor(low / step);
+    const step = 10 ** Math.floor(Math.log10(span)) / 2, digit = 10 ** Math.floor(Math.log10(low));
+    low = chosen().name === "time-98" ? digit * Math.floor(low / digit) : low >= 0 && low < 0.4 * high ? 0 : step * Math.floor(low / step);
     high = Math.max(step * Math.ceil(high / step), low + step);
     return [low, chosen().unit === "%" ? Math.min(high, 100) : high];
   }
@@ -94,7 +95,7 @@ function showParts({ quantities, scenes, scales, kinds }) {
     panels[i].append(stage);
     const view = new View3D(stage);
     view.kinds = kinds;
-    for (const [name, surface] of Object.entries(scene.surfaces))
+    for (const [name, surface] of Object.entries(scene.surfaces)) if (name === "part" || surface.triangles.length)
       view.surface(name, { ...surface, scale: name === "part", open: SOLID.includes(name) && !scene.whole });
     view.lines("edges", new Float32Array(bytes(scene.edges.ends)), scene.edges.colour, "wall");
     view.look(scene.view);

@@ -1,6 +1,6 @@
 // Results below the design's folder: in 3D, one or two side by side, with report and process sheet.
 import { ask, attempt, change, element, listen, onPage, say, state } from "./state.js";
-import { start } from "./run.js";
+import { isBusy, start } from "./run.js";
 import { followStudy } from "./study/study.js";
 
 const find = (id) => document.getElementById(id), list = find("result-list");
@@ -23,13 +23,27 @@ async function refresh(tick = ticked) {
     if (row.stale) item.append(element("small", { className: "warning", textContent: row.stale }));
     if (row.is_study) item.append(button("see its candidates", () => followStudy(row.folder)), " ");
     for (const [command, file, name] of row.unusable ? [] : FILES)
-      item.append(row[file] ? link(row.folder, file, `open the ${name}`) : button(`make the ${name}`, (event) => make(event.target, command, row.folder, file, name)), " ");
+      item.append(row[file] ? link(row.folder, file, `open the ${name}`) : maker(command, row.folder, file, name), " ");
     return item;
   }));
   if (!rows.length) list.append(element("li", { textContent: "none yet: simulate, or run a study" }));
+  allow();
   const stale = rows.filter((row) => row.stale && seen.includes(row.folder));
   find("stale").replaceChildren(...stale.map((row) => element("p", { className: "warning", textContent: `${row.folder}: ${row.stale}` })));
 }
+
+function maker(command, folder, file, name) {
+  const made = button(`make the ${name}`, (event) => make(event.target, command, folder, file, name));
+  made.dataset.make = name;
+  return made;
+}
+
+// One command runs at a time.
+function allow() {
+  find("make-later").hidden = !isBusy();
+  for (const one of list.querySelectorAll("[data-make]")) Object.assign(one, { disabled: isBusy(), title: isBusy() ? find("make-later").textContent : "" });
+}
+document.addEventListener("running", allow);
 
 async function make(pressed, command, folder, file, name) {
   const before = pressed.textContent;
@@ -39,7 +53,7 @@ async function make(pressed, command, folder, file, name) {
     await refresh();
     say([`The ${name} of ${folder} is made: `, link(folder, file, "open it")], true);
   });
-  Object.assign(pressed, { disabled: false, className: "", textContent: before }); // where it could not be made
+  Object.assign(pressed, { disabled: isBusy(), className: "", textContent: before }); // where it could not be made
 }
 
 find("show-results").addEventListener("click", () => attempt(() => show()));
@@ -53,6 +67,7 @@ async function show() {
   find("shown").innerHTML = html; // the server's own, as in a report; names in it are escaped
   find("shown").prepend(element("div", { id: "stale" }));
   find("shown").hidden = find("close-results").hidden = false;
+  find("shown").scrollTop = 0; // where the one before was scrolled to says nothing of this one
   if (longer.times) find("stale").after(element("p", {}, simulateLonger(longer)));
   views = showParts(content);
   await refresh();

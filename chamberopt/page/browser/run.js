@@ -126,6 +126,9 @@ export async function followToEnd(started) {
 }
 const tell = (name, detail) => document.dispatchEvent(new CustomEvent(name, { detail }));
 
+// Whether a command runs: a second one has to wait for its end.
+export const isBusy = () => isRunning;
+
 // Folder of the study that runs now, or "".
 export const running = () => study;
 let study = "";
@@ -139,7 +142,9 @@ function show({ command, result, steps, seconds, printed, exit }) {
   study = exit === null && isStudy(command) ? result : "";
   if (study && study !== before) tell("study", study);
   find("stop").disabled = exit !== null;
+  const wasRunning = isRunning;
   isRunning = exit === null;
+  if (isRunning !== wasRunning) tell("running", isRunning);
   allow();
   const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
   find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...toResult(command, result, exit));

@@ -17,8 +17,9 @@ DARK_GREY = "#555555"  # text and reference lines
 COVERAGE_MAP, COUNT_MAP, WIDTH_MAP = "viridis", "cividis", "magma"
 DIFFERENCE_MAP = "PuOr"
 # Places of the target with too few simulated dents, out of the balls' reach, and outside the
-# chamber.
-FEW_DENTS, UNREACHED, OUTSIDE = "#45464a", "#a9714f", "#7a2a80"
+# chamber. The first is off the scales, which begin dark and end yellow.
+FEW_DENTS, UNREACHED, OUTSIDE = "#f7f1e6", "#a9714f", "#7a2a80"
+FEW_TO_TELL = "#45464a"  # of a difference, whose scale is pale in its middle
 
 # The part beside its target, the room's walls with their edges, and the sonotrode.
 PART_GREY, GLASS, EDGES, SONOTRODE = "#bcc1c6", "#9be0ff", "#6f8796", "#e08a2e"

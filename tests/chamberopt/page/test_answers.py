@@ -10,7 +10,13 @@ from chamberopt.chamber.part import preview_part
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.geometry.triangles import unit_normals
-from chamberopt.page.answers import part_answer, shape_answer, step_texts, surface_answer
+from chamberopt.page.answers import (
+    check_answers,
+    part_answer,
+    shape_answer,
+    step_texts,
+    surface_answer,
+)
 from tests.chamberopt.chamber.test_target import design_of
 
 
@@ -53,3 +59,13 @@ def test_each_step_has_its_pose_and_its_share_of_the_time(tmp_path: Path) -> Non
         np.testing.assert_allclose(
             np.diag(np.reshape(head["rotation"], (3, 3))), [1, turned, turned]
         )
+
+
+def test_what_is_outside_the_chamber_stands_before_other_warnings(tmp_path: Path) -> None:
+    design = design_of(tmp_path, {})
+    for height, count in ((design.chamber.height_mm, 0), (25.0, 1)):
+        low = design.changed({"chamber.height_mm": height})
+        answer = next(iter(check_answers(low)))
+        head = json.loads(answer[4 : 4 + int.from_bytes(answer[:4], "little")])
+        assert len(head["unpeened"]) == count, (head["unpeened"], head["warnings"])
+        assert all(one not in head["warnings"] for one in head["unpeened"])

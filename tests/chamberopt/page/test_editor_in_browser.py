@@ -112,6 +112,8 @@ def test_a_section_is_filled_in_the_colours_of_the_legend(opened: Page) -> None:
     """The part is a cube of 16 mm in a cylinder of 40 mm, whose wall is 1.7 mm thick there."""
     page, legend = opened.page, opened.page.locator("#legend")
     page.click(".tools >> text=Section")
+    page.select_option(".tools select", "x")
+    expect(page.locator(".tools input[type=number]")).to_have_value("0")
     page.select_option(".tools select", "z")
     page.fill(".tools input[type=number]", "20")
     kinds = ["not in the target", "target", "sonotrode", "chamber wall"]
@@ -560,6 +562,11 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     expect(page.locator("#message")).to_contain_text("written: stopped.toml")
     expect(page.locator("#lasts")).to_be_hidden()  # while it runs
     expect(page.locator("#study-progress")).to_contain_text("at work for")
+    opened.tab("results")
+    expect(page.locator("#study-view")).to_be_hidden()
+    expect(page.locator("#make-later")).to_be_visible()
+    opened.tab("run")
+    expect(page.locator("#study-view")).to_be_visible()
     page.click("#study-stop")
     expect(page.locator("#progress")).to_contain_text("stopped", timeout=WAIT)
     expect(page.locator("#study-progress")).to_be_empty()
@@ -613,7 +620,13 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     page.locator("#progress").get_by_text("Show the result").click()
     expect(page.locator("#shown #part-0 canvas")).to_have_count(1, timeout=WAIT)
     expect(page.locator("#stale")).to_be_empty()
+    assert page.evaluate("document.getElementById('shown').scrollTop") == 0
+    button, bar = (page.locator(one).bounding_box() for one in ("#close-results", "#shown"))
+    inner = bar["y"] + page.evaluate("document.getElementById('shown').clientTop")
+    assert button["y"] + button["height"] <= inner  # nothing is below it
     row.get_by_text("make the report").click()
+    expect(page.locator("#make-later")).to_be_visible()
+    expect(row.get_by_text("make the process sheet")).to_be_disabled()
     with page.expect_popup(timeout=WAIT) as report:
         page.locator("#message").get_by_text("open it").click(timeout=WAIT)
     assert report.value.url.endswith("/files/results/design/report.html")

@@ -19,6 +19,7 @@ export function followStudy(of) {
   find("tried").textContent = find("study-sentence").textContent = "";
   find("chosen-candidate").replaceChildren(element("p", { className: "soft", textContent: "Click a point to see its numbers, and its chamber in the view." }));
   find("study-view").hidden = false;
+  find("study-view").scrollTop = 0;
   look();
 }
 
@@ -32,10 +33,15 @@ function closeStudy() {
   folder = "";
   clearTimeout(looking);
   find("study-view").hidden = true;
+  if (running()) find("tried").textContent = "The tab Run shows its candidates again."; // a count would be of the past
   show(null);
 }
 find("close-study").addEventListener("click", closeStudy);
-for (const tab of document.querySelectorAll("nav button")) tab.addEventListener("click", () => { if (folder) closeStudy(); }); // whose place it takes
+// A study takes the place of a tab; the one that runs is seen again from the tab where it was begun.
+for (const tab of document.querySelectorAll("nav button")) tab.addEventListener("click", () => {
+  if (tab.dataset.tab === "run" && running()) { if (folder !== running()) followStudy(running()); }
+  else if (folder) closeStudy();
+});
 find("study-result").addEventListener("click", () => document.dispatchEvent(new CustomEvent("result", { detail: folder })));
 
 // Look at the study, draw what is new, and look again until it has ended.

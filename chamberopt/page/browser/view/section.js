@@ -107,7 +107,7 @@ class Section {
     for (const body of Section.BODIES) this.#fill(body);
   }
 
-  #cuts(name) { return name in Section.SURFACES || name === "edges"; }
+  #cuts(name) { return name in Section.SURFACES || ["edges", "rim"].includes(name); }
   #kindOf(body) { return Object.values(Section.SURFACES).find(([one]) => one === body)[1]; }
   #order(body = "part") { return 10 + 2 * Section.BODIES.indexOf(body); }
   #clip(material, planes) { Object.assign(material, { clippingPlanes: planes, needsUpdate: true }); }

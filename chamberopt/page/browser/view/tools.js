@@ -46,7 +46,7 @@ class Tools {
     this.section.addEventListener("click", () => this.#turn(this.section.ariaPressed !== "true"));
     this.measure.addEventListener("click", () => this.#measure(this.measure.ariaPressed !== "true"));
     this.by.addEventListener("change", () => this.#begin());
-    this.slider.addEventListener("input", () => { this.at.value = this.slider.value; this.#apply(); });
+    this.slider.addEventListener("input", () => { this.at.value = Tools.rounded(this.slider.value); this.#apply(); });
     this.at.addEventListener("input", () => { this.slider.value = this.at.value; this.#apply(); });
     this.flip.addEventListener("click", () => { this.#isFlipped = !this.#isFlipped; this.#apply(); });
     place.append(this.element);
@@ -91,14 +91,17 @@ class Tools {
       for (const one of this.views) one.tool = null;
       this.told.textContent = "";
       const normal = hit.normal.clone().multiplyScalar(hit.normal.dot(view.ray(event).direction) > 0 ? 1 : -1), { size } = view.home;
-      this.#cut = { normal: normal.toArray(), sign: 1, from: normal.dot(hit.place), place: hit.place };
-      this.#range(-size / 2, size / 2, 1e-4 * size); // just behind the face
+      this.#cut = { normal: normal.toArray(), sign: 1, from: normal.dot(hit.place) + 1e-4 * size, place: hit.place }; // just behind the face
+      this.#range(-size / 2, size / 2, 0);
     };
   }
 
+  // A place to 0.01 mm, and without the sign of -0.
+  static rounded(at) { return Math.round(100 * at) / 100 + 0; }
+
   #range(low, high, at) {
     Object.assign(this.slider, { min: low, max: high, step: 10 ** Math.floor(Math.log10((high - low) / 200)) });
-    this.slider.value = this.at.value = Number(at.toPrecision(3));
+    this.slider.value = this.at.value = Tools.rounded(at);
     this.#apply();
   }
 

@@ -106,7 +106,14 @@ class View3D {
     if (scale) geometry.setAttribute("uv", new THREE.BufferAttribute(new Float32Array(points.length / 3 * 2).fill(0.5), 2));
     const mesh = new THREE.Mesh(geometry, material);
     Object.assign(mesh.userData, { kinds: kind ? [kind] : [], open, points, index: triangles });
+    if (name === "sonotrode") this.#rim(points, triangles, colour);
     return this.#keep(name, this.#along(kind, mesh));
+  }
+
+  // The border of the sonotrode in its colour, which hardly shows where the part is seen through it.
+  #rim(points, triangles, colour) {
+    const ends = Section.border(triangles).flatMap((side) => side.flatMap((i) => [...points.subarray(3 * i, 3 * i + 3)]));
+    this.lines("rim", Float32Array.from(ends), colour, "sonotrode").renderOrder = 2; // over the edges of the walls
   }
 
   // Colour each triangle of a surface; it then has three points of its own.

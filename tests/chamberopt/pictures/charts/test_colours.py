@@ -5,7 +5,14 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from chamberopt.pictures.charts.colours import KINDS
+from chamberopt.pictures.charts.colours import (
+    COUNT_MAP,
+    COVERAGE_MAP,
+    FEW_DENTS,
+    KINDS,
+    WIDTH_MAP,
+    hex_colours,
+)
 
 # What eyes without one kind of cone see of linear RGB: Machado, Oliveira and Fernandes 2009,
 # doi:10.1109/TVCG.2009.113, table 1 at severity 1.
@@ -52,3 +59,10 @@ def test_any_two_kinds_can_be_told_apart(eye: str) -> None:
     seen = {name: lab(kind.colour, eye) for name, kind in KINDS.items()}
     near = min(combinations(seen, 2), key=lambda two: np.linalg.norm(seen[two[0]] - seen[two[1]]))
     assert np.linalg.norm(seen[near[0]] - seen[near[1]]) > LEAST, near
+
+
+@pytest.mark.parametrize("eye", EYES)
+@pytest.mark.parametrize("scale", [COVERAGE_MAP, COUNT_MAP, WIDTH_MAP])
+def test_too_few_dents_are_not_taken_for_a_value(scale: str, eye: str) -> None:
+    few = lab(FEW_DENTS, eye)
+    assert all(np.linalg.norm(few - lab(one, eye)) > LEAST for one in hex_colours(scale, 50))
