@@ -25,6 +25,7 @@ Progress = Callable[[float, int, "float | None"], None]
 
 # s until a step gets a line in a log; each further line comes after twice the time
 FIRST_LINE = 30.0
+FEW, FEW_SHARE = 3, 0.1  # items done, and share of all: from the fewer on their pace is told
 LEAST_PAUSE = 0.2  # s between JSON lines of a step
 _json_lines = _is_quiet = False
 # display on the terminal now, at most one: steps within steps share it
@@ -206,7 +207,8 @@ def _log_lines(what: str, stream: TextIO) -> Progress:
         due = now + (now - begun)
         found = "" if best is None else f", best {best:.4f}"
         left = (now - first[0]) * (total - done) / (done - first[1])
-        print(f"{what}: {int(done):,} of {total:,}{found}, about {left:.0f} s left",
-              file=stream, flush=True)  # fmt: skip
+        known = done - first[1] >= min(FEW, FEW_SHARE * total)  # the first may be slow, as resumed
+        time_left = f", about {left:.0f} s left" if known else ""
+        print(f"{what}: {int(done):,} of {total:,}{found}{time_left}", file=stream, flush=True)
 
     return write

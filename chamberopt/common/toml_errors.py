@@ -139,9 +139,10 @@ def explain_missing_file(path: Path, what: str, pattern: str) -> str:
     names = sorted(p.name for p in folder.glob(pattern) if p.is_file())
     # The suffixes are left out, because they are alike and would make every name similar.
     close = closest_name(path.stem, (Path(name).stem for name in names))
-    likely = [str(folder / name) for name in names if Path(name).stem == close]
+    likely = [folder / name for name in names if Path(name).stem == close]
+    likely = [one for one in likely if one.suffix == path.suffix] or likely
     if likely:
-        return f"{path}: no such {what}; did you mean {' or '.join(likely)}?"
+        return f"{path}: no such {what}; did you mean {' or '.join(map(str, likely))}?"
     found = ", ".join(names[:MAX_CHOICES]) or "none"
     place = "this folder" if folder == Path() else folder
     return f"{path}: no such {what}; in {place} there is {found}"

@@ -657,6 +657,21 @@ class TestProgress:
             "evaluations: 95 of 100, best 0.5000, about 25 s left",
         ]
 
+    def test_a_log_tells_no_time_by_the_pace_of_one_slow_item(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """A search that goes on at 20 of 76 takes 40 s for the next candidate, 3 s for others."""
+        clock = [0.0]
+        monkeypatch.setattr("chamberopt.common.progress.time.monotonic", lambda: clock[0])
+        stream = io.StringIO()
+        with step("evaluations", stream=stream) as progress:
+            for done in (20, *range(21, 60)):
+                clock[0] += 40.0 if done == 21 else 3.0
+                progress(done, 76, None)
+        first, second, *_ = stream.getvalue().splitlines()
+        assert first == "evaluations: 21 of 76"
+        assert second.startswith("evaluations: 36 of 76, about ")
+
     def test_a_log_has_no_lines_of_steps_within_a_counted_one(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:

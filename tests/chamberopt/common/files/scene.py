@@ -50,10 +50,8 @@ def compile_all() -> None:
 def remember_all() -> None:
     """Do what compile_all does, and compute nothing again that it has computed."""
     _remember(build, "build_chamber")
-    _remember(save_run, "build_chamber")
     _remember(save_run, "complete_result")
     _remember(calibration_errors, "evaluate_calibrated")
-    _remember(ranges, "build_chamber")
     _remember(ranges, "simulate_ends")
     _remember(ChamberSimulator, "__call__")
     os.fsync = lambda _: None  # the disk is slow, and no power cut is tested
