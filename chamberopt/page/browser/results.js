@@ -68,7 +68,7 @@ async function show() {
   find("shown").prepend(element("div", { id: "stale" }));
   find("shown").hidden = find("close-results").hidden = false;
   find("shown").scrollTop = 0; // where the one before was scrolled to says nothing of this one
-  if (longer.times) find("stale").after(element("p", {}, simulateLonger(longer)));
+  if (longer.times) find("shown").querySelector("section").append(element("p", {}, simulateLonger(longer)));
   views = showParts(content);
   await refresh();
   if (places) await showDifference(folders);
