@@ -12,15 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.geometry.triangles import areas, interpolate, unit_vectors
+from chamberopt.geometry.triangles import EVEN_STEP, areas, interpolate, on_triangles, unit_vectors
 
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
 
 MAX_SHRINKS = 50  # 5 are usual
-# A sequence that fills a square evenly from its first point on, from powers of the plastic number.
-# Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
-SEQUENCE_STEP = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 class TouchPoints(NamedTuple):
@@ -99,20 +96,9 @@ def spread_points(
         triangle = triangle[number]
     # One sequence runs over all triangles. If it began again on each triangle, the points of a row
     # of similar triangles would lie on a few lines.
-    u, v = ((1.0 / 3.0 + number[:, None] * SEQUENCE_STEP) % 1.0).T
+    u, v = ((1.0 / 3.0 + number[:, None] * EVEN_STEP) % 1.0).T
     point = on_triangles(vertices[triangles[triangle]], u, v)
     return triangle, point, (size / np.maximum(count, 1))[triangle]
-
-
-def on_triangles(corners: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Map points u, v (..., n) of the unit square to points (..., n, c) on triangles (n, 3, c).
-
-    One half of the square is folded onto the other, so that an even spread stays even.
-    """
-    fold = u + v > 1.0
-    u, v = np.where(fold, 1.0 - u, u)[..., None], np.where(fold, 1.0 - v, v)[..., None]
-    a, b, c = corners.swapaxes(0, 1)
-    return np.asarray(a + u * (b - a) + v * (c - a))
 
 
 def largest_balls(

@@ -572,8 +572,7 @@ def _pose(given: PartMesh, mesh: PartMesh, design: Design) -> tuple[np.ndarray, 
     middle = (low[:2] + high[:2]) / 2.0
     aside = np.array(design.part.offset) - middle
     posed, plan = mesh.vertices @ turn.T, design.chamber.plan()
-    lowest = float(posed[:, 2].min())
-    if plan is not None:
-        within = lowest_over(posed, mesh.triangles, plan - aside)
-        lowest = within if math.isfinite(within) else lowest  # no part in it: refused when built
+    lowest = math.inf if plan is None else lowest_over(posed, mesh.triangles, plan - aside)
+    if not math.isfinite(lowest):  # a part beside the chamber is refused when it is built
+        lowest = float(posed[:, 2].min())
     return turn, np.array([*design.part.offset, distance]) - np.r_[middle, lowest]

@@ -17,7 +17,7 @@ def lowest_over(vertices: np.ndarray, triangles: np.ndarray, outline: np.ndarray
     It is at a vertex, where an edge crosses the outline, or over a corner of the outline.
 
     Args:
-        vertices, triangles: of the surface, (n, 3) [m] and (m, 3).
+        vertices, triangles: of the surface, (n, 3) [m] and (m, 3); each vertex is a corner.
         outline: corners (k, 2) [m] of a convex outline, counter-clockwise.
     """
     along = np.roll(outline, -1, axis=0) - outline
@@ -28,11 +28,10 @@ def lowest_over(vertices: np.ndarray, triangles: np.ndarray, outline: np.ndarray
         within = (points[:, :2] @ out.T <= reach + 1e-3 * INSIDE).all(axis=1)
         return float(points[within, 2].min(initial=math.inf))
 
-    own = vertices[np.unique(triangles)]
-    least = own[:, 2].min()
-    if lowest(own[own[:, 2] == least]) == least:  # usual, and saves the rest
+    least = vertices[:, 2].min()
+    if lowest(vertices[vertices[:, 2] == least]) == least:  # usual, and saves the rest
         return float(least)
-    found = lowest(own)
+    found = lowest(vertices)
     start, end = vertices[sides_of(triangles)].transpose(1, 0, 2)
     for normal, at in zip(out, reach, strict=True):
         before, after = start[:, :2] @ normal - at, end[:, :2] @ normal - at

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from chamberopt.geometry.triangles import areas, unit_normals
+from chamberopt.geometry.triangles import EVEN_STEP, areas, on_triangles, unit_normals
 
 POINTS = 10_000  # on the chosen triangles, and as many on the others
 AROUND = 12  # directions in a row of one height
@@ -23,8 +23,6 @@ ALIKE = 0.9  # of the most that is seen: the usual way shows enough
 COLUMN = 2.0  # distances of neighbouring points
 NEARER = 3.0  # columns' widths: what is nearer to the eye by more hides a point
 ASIDE = 0.5  # weight of the usual way, by which the eye goes aside to show the depth
-# Plane fractions of the most even sequence of points in a square, by M. Roberts (2018).
-EVEN = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 def way_to_see(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
@@ -41,13 +39,15 @@ def way_to_see(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) 
     usual = _way(turn[:1], 20.0)[0]
     if not chosen.any():
         return np.asarray(usual)
-    corners = vertices[triangles]
+    corners, area = vertices[triangles], areas(vertices, triangles)
     place, normal = (
         np.concatenate(both)
-        for both in zip(*(_spread(corners[one]) for one in (chosen, ~chosen)), strict=True)
+        for both in zip(
+            *(_spread(corners[one], area[one]) for one in (chosen, ~chosen)), strict=True
+        )
     )
     wanted = np.arange(len(place)) < POINTS
-    width = COLUMN * float(np.sqrt(areas(vertices, triangles).sum() / len(place)))
+    width = COLUMN * float(np.sqrt(area.sum() / len(place)))
 
     def seen(ways: np.ndarray) -> np.ndarray:
         return np.array([_share(place, normal, wanted, way, width) for way in ways])
@@ -72,17 +72,19 @@ def _way(turn: np.ndarray, height: float) -> np.ndarray:
     return np.column_stack([flat, np.full(len(turn), np.sin(up))])
 
 
-def _spread(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return places and normals (POINTS, 3) spread evenly over triangles (m, 3, 3), if any."""
+def _spread(corners: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return places and normals (POINTS, 3) spread evenly over triangles (m, 3, 3), if any.
+
+    Args:
+        area: of each triangle, (m,).
+    """
     if not len(corners):
         return np.empty((0, 3)), np.empty((0, 3))
-    upto = np.cumsum(np.linalg.norm(np.cross(*np.diff(corners, axis=1).swapaxes(0, 1)), axis=1))
+    upto = np.cumsum(area)
     at = upto[-1] * (np.arange(POINTS) + 0.5) / POINTS
     triangle = np.minimum(np.searchsorted(upto, at), len(corners) - 1)
-    u, v = (np.arange(POINTS)[:, None] * EVEN % 1.0).T
-    u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
-    a, b, c = corners[triangle].swapaxes(0, 1)
-    return a + u[:, None] * (b - a) + v[:, None] * (c - a), unit_normals(corners[triangle])
+    u, v = (np.arange(POINTS)[:, None] * EVEN_STEP % 1.0).T
+    return on_triangles(corners[triangle], u, v), unit_normals(corners[triangle])
 
 
 def _share(

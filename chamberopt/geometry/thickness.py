@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chamberopt.geometry.triangles import areas, count_up, unit_normals, unit_vectors
+from chamberopt.geometry.triangles import EVEN_STEP, areas, count_up, unit_normals, unit_vectors
 
 SPACING = 0.5  # of sample points, over the length of the smoothing
 MAX_SAMPLES = 20_000
@@ -33,8 +33,6 @@ BECOMES_THICK = 2.0  # times the thickness: there a plate ends
 RIM = 2.0  # discs' radii; a corner of a plate is 1.4 from the middle of the last disc in it
 MAX_PAIRS = 400  # second points of a pair for each first one, about
 AT_ONCE = 4000  # first points of pairs, which take 40 MB
-# Plane fractions of the most even sequence of points in a square, by M. Roberts (2018).
-EVEN = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 class Samples(NamedTuple):
@@ -135,7 +133,7 @@ def _spread(vertices: np.ndarray, triangles: np.ndarray, length: float) -> Sampl
     ends = np.floor(np.cumsum(area) / each + 0.5).astype(np.int64)
     count = np.diff(ends, prepend=0)
     triangle = np.repeat(np.arange(len(triangles)), count)
-    share = (0.5 + (count_up(count)[:, None] + 1) * EVEN) % 1.0
+    share = (0.5 + (count_up(count)[:, None] + 1) * EVEN_STEP) % 1.0
     beyond = share.sum(axis=1) > 1.0
     share[beyond] = 1.0 - share[beyond]
     corners = vertices[triangles[triangle]]

@@ -7,6 +7,9 @@ triangle t runs from its corner k to the next corner. The sides of all triangles
 import numpy as np
 
 LEVEL = 1e-3  # rad: a surface that rises by less is level up to rounding
+# Step of a sequence that fills a square evenly from its first point on, from powers of the plastic
+# number. Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
+EVEN_STEP = np.array([0.7548776662466927, 0.5698402909980532])
 MAX_SAMPLES = 8  # points of a shell that are tested for lying in another shell
 
 
@@ -231,6 +234,17 @@ def interpolate(values: np.ndarray, corners: np.ndarray, places: np.ndarray) -> 
         piece = np.einsum("ij,ij->i", np.cross(two - one, places - one), normal)
         weights[some, k] = piece[some] / square[some]
     return np.asarray(np.einsum("pk,pkc->pc", weights, values))
+
+
+def on_triangles(corners: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Map points u, v (..., n) of the unit square to points (..., n, c) on triangles (n, 3, c).
+
+    One half of the square is folded onto the other, so that an even spread stays even.
+    """
+    fold = u + v > 1.0
+    u, v = np.where(fold, 1.0 - u, u)[..., None], np.where(fold, 1.0 - v, v)[..., None]
+    a, b, c = corners.swapaxes(0, 1)
+    return np.asarray(a + u * (b - a) + v * (c - a))
 
 
 def unit_normals(corners: np.ndarray) -> np.ndarray:

@@ -161,14 +161,16 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
     """
     longer: dict[str, object] = {}
     html, content = parts_content(folders)
-    if _times_differ(folders):
-        sentences = after_shorter_time([*map(load_result, folders)], labels(folders))
+    results = [*map(load_result, folders)]
+    is_alike = len({one.design.process.treatment_time for one in results}) == 1
+    if not is_alike:
+        sentences = after_shorter_time(results, labels(folders))
         told = [Sentence(sentences[0], "sentence"), Sentence(sentences[1], "warning")]
         first = Section("Comparison", told, is_answer=True)
     elif len(folders) > 1:
         first = comparison_overview(compare(folders))
     else:
-        result = load_result(folders[0])
+        (result,) = results
         first = answer_section(result, load_start(result))
         if (times := times_longer(result)) > 1:
             now = result.design.process.accuracy.simulated_time_s
@@ -180,12 +182,8 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
         + html
         + (section(Section("In figures", figures), viewer) if figures else "")
     )
-    places = len(folders) > 1 and not _times_differ(folders)  # whether these can be compared
+    places = len(folders) > 1 and is_alike  # whether these can be compared
     return {"content": content, "html": html, "longer": longer, "places": places}
-
-
-def _times_differ(folders: Sequence[Path]) -> bool:
-    return len({load_result(one).design.process.treatment_time for one in folders}) > 1
 
 
 def difference(folders: Sequence[Path]) -> dict[str, str]:

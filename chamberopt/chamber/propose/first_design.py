@@ -5,7 +5,6 @@ Every number comes from a rule of thumb, with its reason beside it. A study then
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -64,13 +63,14 @@ from chamberopt.chamber.propose.proposed_end import (
     local_room,
 )
 from chamberopt.chamber.propose.proposed_floor import (
+    OUTSIDE,
     Floor,
+    clear_of_face,
     floor_on_sonotrode,
     of_blocks,
     require_room,
 )
 from chamberopt.chamber.propose.proposed_target import (
-    Sizes,
     Surface,
     Target,
     middle_in_plan,
@@ -120,8 +120,6 @@ BETWEEN = "a plate that fits between the faces of the part, like the two walls b
 CUT_OUT = "plates, cut out round it"
 OWN_WALL, OWN_LID = "the part itself is the wall", f"the part itself is the lid: {CUT_OUT}"
 START = "NOT MEASURED by a pilot, a start"
-CLEAR, FARTHER = 1e-3, 1.0  # m; and share of the distance, for the next
-OUTSIDE = f"outside of the walls the part stays {1e3 * CLEAR:g} mm above the sonotrode's face"
 ON_END = "on end, as no single sonotrode is large enough for it lying"
 
 
@@ -538,7 +536,10 @@ def _place(
             if local is not None:
                 lowest = lowest_over(posed, mesh.triangles, local.plan(floor.sizes))
                 floor = floor._replace(sizes=local.as_low_as(floor.sizes, lowest))
-                floor = _clear_of_face(posed, mesh.triangles, floor, local.middle, lowest)
+                below = lowest - floor.sizes.distance
+                floor = clear_of_face(
+                    floor, posed, mesh.triangles, local.middle(floor.sizes), below
+                )
             if shop is not None:
                 room, highest = require_room(floor.sizes, shop), float(posed[:, 2].max()) - lowest
                 if highest < room.height - room.distance:  # a higher lid takes in the whole part
@@ -555,31 +556,6 @@ def _place(
     if refused and not found:
         raise refused
     return min(found, key=lambda one: one[1].excess)
-
-
-def _clear_of_face(
-    posed: np.ndarray,
-    triangles: np.ndarray,
-    floor: Floor,
-    middle: Callable[[Sizes], np.ndarray],
-    lowest: float,
-) -> Floor:
-    """Return a floor so far below a part that its face does not hit what is outside of the walls.
-
-    Args:
-        posed, triangles: the part in its pose, (n, 3) [m] and (m, 3).
-        middle: the middle of the chamber in plan in the pose (2,) [m], for its sizes.
-        lowest: height of the part's lowest point within the walls, in the pose [m].
-    """
-    face, sizes = floor.face, floor.sizes
-    if face is None:
-        return floor
-    over = lowest_over(posed, triangles, face.outline + middle(sizes))
-    lacks = 1e-3 * math.ceil(1e3 * (lowest - sizes.distance + CLEAR - over) - 1e-6)
-    if not 0.0 < lacks <= FARTHER * sizes.distance:  # a distance too large is refused when built
-        return floor
-    sizes = replace(sizes, distance=sizes.distance + lacks, height=sizes.height + lacks)
-    return floor._replace(sizes=sizes, above_face=CLEAR)
 
 
 def _hanging(
@@ -641,7 +617,7 @@ def _floor_reasons(floor: Floor, goes_out: bool, ball: float) -> dict[str, str]:
     return {
         "chamber.height_mm": f"sonotrode to ceiling{where}",
         "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point in it"
-        + (f", so far that {OUTSIDE}" if floor.above_face else ""),
+        + (f", so far that {OUTSIDE}" if floor.is_raised else ""),
         **({"sonotrode.frequency_khz": one.note} if one.note else {}),
         **({"sonotrode.face": of_blocks(ball)} if floor.stand.face.count > 1 else {}),
         **({"part.offset_mm": placed} if any(floor.offset_mm) else {}),

@@ -29,11 +29,15 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.design.fixture import WIDEST_GAP
 from chamberopt.design.sonotrode import Face
+from chamberopt.geometry.heights import lowest_over
 
 TIGHTER = 0.6  # share of the room beside the part that is left, so that the walls stand upright
 STEEPEST = 30.0  # degrees: walls that lean more throw the balls up rather than inwards
 FARTHER = 1.5  # factor by which the sonotrode's distance may grow, so that walls lean less
 WIDEST = 25e-3  # m: how far a leaning wall may move out up to the ceiling
+CLEAR = 1e-3  # m: least height of what is outside of the walls over the face
+OUTSIDE = f"outside of the walls the part stays {1e3 * CLEAR:g} mm above the sonotrode's face"
+MOST_RAISED = 1.0  # share of the distance by which it may grow for that
 HELD = 1e-9  # m: a floor that must move in by no more lies within a face
 LEAST_ROOM = 4.0  # ball diameters beside the part that save a sonotrode
 # A face up to so much larger than the wanted floor becomes the whole floor: of one sonotrode, and
@@ -58,7 +62,9 @@ class Floor(NamedTuple):
     lean: float = 0.0  # of the walls [degrees]; infinite if no sonotrode is large enough
     too_large: float = 0.0  # area of a floor for which no sonotrode is large enough [m²]
     offset_mm: tuple[float, float] = (0.0, 0.0)  # of the part, so that its target is on the axis
-    above_face: float = 0.0  # how far the part outside of the walls stays above the face [m]
+    is_raised: bool = (
+        False  # whether the part is higher to stay clear of the face outside the walls
+    )
 
     @property
     def is_one_sonotrode(self) -> bool:
@@ -68,7 +74,7 @@ class Floor(NamedTuple):
     @property
     def face(self) -> Face | None:
         """The face as it lies under the chamber; None if none is large enough."""
-        return _laid(self.sizes, self.stand) if math.isfinite(self.lean) else None
+        return _laid(self.sizes, self.stand.face) if math.isfinite(self.lean) else None
 
     @property
     def excess(self) -> tuple[float, ...]:
@@ -93,14 +99,14 @@ def floor_on_sonotrode(
         InputError: the shop has no sonotrode for it.
     """
     sizes = _as_wide_as_high(sizes, shop)
-    moves = [(_move(sizes, round_part, one), one) for one in shop.stands()]
+    moves = [(_move(sizes, round_part, one.face), one) for one in shop.stands()]
     if held := [one for move, one in moves if move <= HELD]:
         return _over_the_face(sizes, shop, min(held, key=lambda one: one.face.area_mm2))
     move, stand = min(moves, key=lambda one: one[0])
     is_given = sizes.shape == "conformal" or sizes.is_fixed
     tighter = 0.0 if is_given else (1.0 - TIGHTER) * sizes.gap
     if move <= tighter:
-        return _over_the_face(_tight(sizes, move, stand), shop, stand)
+        return _over_the_face(_tight(sizes, move, stand.face), shop, stand)
     far = min(
         max(sizes.distance, move / math.tan(math.radians(STEEPEST))), FARTHER * sizes.distance
     )
@@ -111,11 +117,11 @@ def floor_on_sonotrode(
         height = sizes.height + far - sizes.distance
         return _leaning(replace(sizes, distance=far, height=height), move, angle, stand)
     blocks = list(shop.stands_of_blocks())
-    floors = [(one.face.area_mm2, _move(sizes, round_part, one), one) for one in blocks]
+    floors = [(one.face.area_mm2, _move(sizes, round_part, one.face), one) for one in blocks]
     closer = 0.0 if is_given else sizes.gap - LEAST_ROOM * ball
     if near := [one for one in floors if one[1] <= max(tighter, closer, HELD)]:
         _, out, stand = min(near, key=lambda one: one[0])
-        return _over_the_face(_tight(sizes, out, stand) if out > HELD else sizes, shop, stand)
+        return _over_the_face(_tight(sizes, out, stand.face) if out > HELD else sizes, shop, stand)
     sides = _sides(sizes, round_part)
     wanted = " x ".join(f"{1e3 * one:.4g}" for one in sides)
     ways = (
@@ -163,40 +169,40 @@ def _sides(sizes: Sizes, round_part: float) -> tuple[float, float]:
     return (2.0 * _radius(sizes, round_part),) * 2
 
 
-def _move(sizes: Sizes, round_part: float, stand: Stand) -> float:
+def _move(sizes: Sizes, round_part: float, face: Face) -> float:
     """Return how far the walls of the wanted floor must move in to stand on a face [m].
 
     It is at most 0 if the floor lies within the face, and infinite if no floor of this form does.
     A box whose walls move in by t has the half diagonal r at x + y - 2 t = sqrt(2 r² - (x - y)²).
     """
-    width = 5e-4 * stand.face.sides_mm[1]
+    width = 5e-4 * face.sides_mm[1]
     if sizes.shape != "box":
         radius = _radius(sizes, round_part)
         inner = math.cos(math.pi / int(sizes.plan["sides"])) if sizes.shape == "prism" else 1.0
         return inner * (radius - width)
     x, y = _half(sizes)
-    if stand.face.size_mm is not None:
-        along_x, along_y = (5e-4 * one for one in _laid(sizes, stand).sides_mm)
+    if face.size_mm is not None:
+        along_x, along_y = (5e-4 * one for one in _laid(sizes, face).sides_mm)
         return max(x - along_x, y - along_y)
     square = 2.0 * width**2 - (x - y) ** 2
     move = 0.5 * (x + y - math.sqrt(square)) if square > 0.0 else math.inf
     return move if move < 0.8 * min(x, y) else math.inf
 
 
-def _moved(sizes: Sizes, move: float, stand: Stand) -> dict[str, float | str]:
+def _moved(sizes: Sizes, move: float, face: Face) -> dict[str, float | str]:
     """Return the keys of the floor with its walls moved in by some length [m] onto a face."""
     if sizes.shape == "cylinder":
-        return {**sizes.plan, "diameter_mm": stand.face.sides_mm[1]}
+        return {**sizes.plan, "diameter_mm": face.sides_mm[1]}
     plan = {key: one for key, one in sizes.plan.items() if key.endswith("_mm")}
     inside = {key: math.floor(10.0 * float(one) - 2e4 * move) / 10.0 for key, one in plan.items()}
     return {**sizes.plan, **inside}
 
 
-def _tight(sizes: Sizes, move: float, stand: Stand) -> Sizes:
+def _tight(sizes: Sizes, move: float, face: Face) -> Sizes:
     """Return sizes with less room beside the part, so that the floor lies within a face."""
-    plan = _moved(sizes, move, stand)
-    if sizes.shape == "box" and stand.face.size_mm is not None:  # only where it is too wide
-        sides = zip(plan, _laid(sizes, stand).sides_mm, strict=True)
+    plan = _moved(sizes, move, face)
+    if sizes.shape == "box" and face.size_mm is not None:  # only where it is too wide
+        sides = zip(plan, _laid(sizes, face).sides_mm, strict=True)
         plan = {key: min(float(sizes.plan[key]), side) for key, side in sides}
     return replace(sizes, plan=plan, gap=sizes.gap - move)
 
@@ -206,7 +212,7 @@ def _over_the_face(sizes: Sizes, shop: Shop, stand: Stand) -> Floor:
 
     A wall that goes round the face stands beside it by the clearance, which is not simulated.
     """
-    clear, face = f"{shop.clearance_mm:g} mm clear", _laid(sizes, stand)
+    clear, face = f"{shop.clearance_mm:g} mm clear", _laid(sizes, stand.face)
     name = _named(face)
 
     def room(sides: Iterable[float]) -> str:
@@ -238,11 +244,11 @@ def _over_the_face(sizes: Sizes, shop: Shop, stand: Stand) -> Floor:
     return Floor(sizes, stand, f"on {name}: the wall {where}")
 
 
-def _laid(sizes: Sizes, stand: Stand) -> Face:
+def _laid(sizes: Sizes, face: Face) -> Face:
     """Return a face as it lies under a floor, the longer sides of both along one axis."""
     plan = sizes.plan
     is_turned = sizes.shape == "box" and float(plan["length_mm"]) < float(plan["width_mm"])
-    return stand.face.turned if is_turned else stand.face
+    return face.turned if is_turned else face
 
 
 def _named(face: Face) -> str:
@@ -253,12 +259,33 @@ def _named(face: Face) -> str:
 def _leaning(sizes: Sizes, move: float, angle: float, stand: Stand) -> Floor:
     """Return a floor that is smaller than the room, with walls that lean out from it."""
     lean = float(math.ceil(angle))
-    plan = {**_moved(sizes, move, stand), "inclination_deg": lean}
+    plan = {**_moved(sizes, move, stand.face), "inclination_deg": lean}
     reason = (
         f"the floor is {_named(stand.face)}; its walls lean out by {lean:g}°, to be wide "
         "enough where the part is"
     )
     return Floor(replace(sizes, plan=plan), stand, reason, lean)
+
+
+def clear_of_face(
+    floor: Floor, posed: np.ndarray, triangles: np.ndarray, middle: np.ndarray, below: float
+) -> Floor:
+    """Return a floor so far below a part that its face does not hit what is outside of the walls.
+
+    Args:
+        posed, triangles: the part in its pose, (n, 3) [m] and (m, 3).
+        middle: the middle of the floor in plan, in the pose (2,) [m].
+        below: height of the floor in the pose [m].
+    """
+    face, sizes = floor.face, floor.sizes
+    if face is None:
+        return floor
+    over = lowest_over(posed, triangles, face.outline + middle)
+    lacks = 1e-3 * math.ceil(1e3 * (below + CLEAR - over) - 1e-6) if math.isfinite(over) else 0.0
+    if not 0.0 < lacks <= MOST_RAISED * sizes.distance:  # what is still hit is refused when built
+        return floor
+    sizes = replace(sizes, distance=sizes.distance + lacks, height=sizes.height + lacks)
+    return floor._replace(sizes=sizes, is_raised=True)
 
 
 def require_room(sizes: Sizes, shop: Shop) -> Sizes:

@@ -79,7 +79,7 @@ class ShopSonotrode(FileTable):
     def face(self) -> Face:
         """Its face, the longer side of a block along x."""
         size = None if self.size_mm is None else (max(self.size_mm), min(self.size_mm))
-        return Face(name=self.name, diameter_mm=self.diameter_mm, size_mm=size, columns=1, rows=1)
+        return Face(name=self.name, diameter_mm=self.diameter_mm, size_mm=size)
 
 
 class Stand(NamedTuple):

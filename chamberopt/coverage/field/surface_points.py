@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.largest_ball import on_triangles
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
 from chamberopt.common.estimate import CONFIDENCE, normal_quantile
-from chamberopt.geometry.triangles import count_up, unit_normals
+from chamberopt.geometry.triangles import count_up, on_triangles, unit_normals
 
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
