@@ -194,8 +194,10 @@ def _sentence(made: Proposal) -> str:
     design, part = made.design, made.chamber.part
     balls = " and then ".join(_balls(made))
     area = area_in_mm2(float(part.area[part.target].sum()))
+    strips = f", in each of {made.settings} settings" if made.settings > 1 else ""
     return (
-        f"Peen {one_line(_target(made))} ({area}) of {one_line(design.part.mesh_path.name)} for "
+        f"Peen {one_line(_target(made))} ({area}{strips}) of "
+        f"{one_line(design.part.mesh_path.name)} for "
         f"{time_in_words(design.process.treatment_time)} with {balls}, the sonotrode at "
         f"{design.sonotrode.zero_to_peak_um:g} µm zero-to-peak."
     )

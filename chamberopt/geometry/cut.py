@@ -22,6 +22,18 @@ NEAR_END = 0.02
 STRAIGHT, FINE, MOST_HALVINGS = 0.01, 0.1, 20
 
 
+def facets(vertices: np.ndarray, triangles: np.ndarray) -> Surface:
+    """Return a mesh as a surface whose normals are those of its facets.
+
+    Args:
+        vertices, triangles: the mesh, (n, 3) [m] and (m, 3).
+    """
+    count = len(triangles)
+    normal = np.repeat(unit_vectors(area_vectors(vertices, triangles))[:, None], 3, axis=1)
+    marks = np.zeros((count, 3), dtype=bool)
+    return Surface(vertices, triangles, np.arange(count), normal, marks, np.ones(count))
+
+
 def cut_at_box(surface: Surface, box: np.ndarray, wanted: np.ndarray) -> Surface:
     """Return a surface whose wanted triangles are divided at the sides of a box.
 
@@ -76,10 +88,7 @@ def piece_beyond(
         Vertices [m] and triangles of the piece, and the values, linear in between, of its vertices.
         There are none if all of the surface is nearer.
     """
-    count = len(triangles)
-    normal = np.repeat(unit_vectors(area_vectors(vertices, triangles))[:, None], 3, axis=1)
-    marks = np.zeros((count, 3), dtype=bool)
-    surface = Surface(vertices, triangles, np.arange(count), normal, marks, np.ones(count))
+    surface = facets(vertices, triangles)
     for _ in range(MOST_HALVINGS):
         ends, edge = _edges(surface.triangles)
         beyond = distance(surface.vertices) - least

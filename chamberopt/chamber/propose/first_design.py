@@ -57,13 +57,17 @@ from chamberopt.chamber.propose.proposed_arbor import (
 from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball, sizes_to_try
 from chamberopt.chamber.propose.proposed_end import (
     HeldEnd,
+    Shape,
     bare_end,
     can_be_clamped,
+    cut_shape,
     held_end,
     local_room,
+    strip,
 )
 from chamberopt.chamber.propose.proposed_floor import (
     OUTSIDE,
+    SEVERAL,
     Floor,
     clear_of_face,
     floor_on_sonotrode,
@@ -94,6 +98,7 @@ from chamberopt.geometry.triangles import rotation_matrix
 LEAST_TOUCHED = 0.02  # share of the target that balls which are wished for have to touch
 REACHES = 0.95  # of a part's length, from which on a target reaches both of its ends
 AT_WALL = 2.0  # ball diameters from the target to the wall through which its end goes out
+ROUNDED = 0.5e-3  # m by which sizes are rounded up
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
@@ -120,6 +125,7 @@ BETWEEN = "a plate that fits between the faces of the part, like the two walls b
 CUT_OUT = "plates, cut out round it"
 OWN_WALL, OWN_LID = "the part itself is the wall", f"the part itself is the lid: {CUT_OUT}"
 START = "NOT MEASURED by a pilot, a start"
+FEWER = "so that a strip of it takes few sonotrodes"
 ON_END = "on end, as no single sonotrode is large enough for it lying"
 
 
@@ -140,7 +146,7 @@ def propose(
     asked = choose(known)
     target = propose_target(mesh, known, asked)
     _require_near_origin(path, target)
-    shape = mesh.vertices, mesh.triangles, target.triangles
+    shape = Shape(mesh.vertices, mesh.triangles, target.triangles)
     if wanted.pose is None:
         turns, pose_reason = propose_pose(*shape)
     else:
@@ -185,7 +191,7 @@ def _lying(
     by_root: Proposal | None = None
     if (bare := bare_end(mesh, target, upright)) is not None:
         with suppress(InputError):
-            root = bare._replace(turns=turns)
+            root = bare._replace(turns=turns, goes_out=True)
             made = _proposed(path, wanted, mesh, known, target, turns, reason, root)
             if is_firm(made):
                 by_root = made
@@ -195,7 +201,7 @@ def _lying(
     whole = np.ptp(along[mesh.triangles[target.triangles]]) > REACHES * np.ptp(along)
     for of_any in (False, True):
         end = None if keeps_target else held_end(mesh, target, upright, of_any)
-        lying = None if end is None else end._replace(turns=turns)
+        lying = None if end is None else end._replace(turns=turns, goes_out=True)
         made = _proposed(path, wanted, mesh, known, target, turns, reason, lying)
         if end is not None or keeps_target or not whole or is_firm(made):
             break
@@ -205,6 +211,35 @@ def _lying(
     if by_root is not None and rests(made) and faults(by_root) <= faults(made):
         return by_root
     return made
+
+
+def _in_strips(
+    path: Path,
+    wanted: Wanted,
+    mesh: PartMesh,
+    known: Sequence[Surface],
+    target: Target,
+    poses: dict[Turns, str],
+    ball: float,
+) -> Proposal | None:
+    """Return the proposal for a strip of a target that takes the fewest sonotrodes, of few faults.
+
+    It is None where no strip stands on as many sonotrodes as a shop mounts.
+
+    Args:
+        poses: the poses that are tried [degrees], and why each is taken.
+        ball: diameter of the balls [m].
+    """
+    shop, found = wanted.shop or usual_shop(), []
+    sides = [side for one in shop.sonotrodes if one.size_mm for side in one.size_mm]
+    longest = 1e-3 * max(sides, default=0.0) - 2.0 * AT_WALL * ball - ROUNDED
+    for turns, why in poses.items():
+        if (end := strip(mesh, target, turns, longest)) is not None:
+            with suppress(InputError):
+                made = _proposed(path, wanted, mesh, known, target, turns, why, end)
+                if made.design.sonotrode.face and made.sonotrode_count <= SEVERAL:
+                    found.append(made)
+    return min(found, key=lambda one: (one.sonotrode_count, *faults(one)), default=None)
 
 
 def _proposed(
@@ -223,10 +258,11 @@ def _proposed(
 
     Args:
         turns, pose_reason: the pose that suits the target [degrees], and why.
-        end: an end that is left out of the target, and the pose in which the part is held by it.
+        end: an end that is left out of the target, or all beside a strip of it, and the pose.
     """
     part_alloy, shop = alloy(wanted.alloy or USUAL_PART).name, wanted.shop or usual_shop()
     shot, shot_reason = _shot(wanted.shot, part_alloy, shop)
+    whole = target
     if end is not None:
         target, turns = end.target, end.turns
     tables: Tables = {
@@ -256,6 +292,21 @@ def _proposed(
     tables["shot"]["diameter_mm"] = round(1e3 * diameter, 4)
     if not (end or wanted.pose) and (hanging := _hanging(mesh, target, turns, diameter, wanted)):
         turns, pose_reason = hanging, ON_END
+    shape = cut_shape(mesh, target.triangles, target.keys.get("box_mm"))
+    # Balls would lie on what holds an end at the side: it goes out through the wall instead.
+    out = end.axis if end is not None and end.goes_out else None
+    bores = find_bores(mesh, target.triangles)
+    may_turn = wanted.may_turn and wanted.pose is None
+    turning = turning_bore(bores, mesh, target.triangles) if may_turn else None
+    is_whole = turning is None and (end is None or end.settings == 1)
+    if is_whole and not _can_be_mounted(shape, turns, diameter, wanted, out):
+        poses = {turns: pose_reason}
+        for one in AT_SIDE if wanted.pose is None else ():
+            pose = pose_by_size(mesh.vertices, mesh.triangles, whole.triangles, one)
+            poses.setdefault(pose, FEWER)
+        in_strips = _in_strips(path, wanted, mesh, known, whole, poses, diameter)
+        if in_strips is not None:
+            return in_strips
     is_guessed = any(f"({BY_SIZE})" in note for note in mesh.notes)
     measures = f"the part measures {format_box(mesh.size)}"
     by = "as asked" if wanted.unit in METRES_PER else "by the file"
@@ -278,9 +329,6 @@ def _proposed(
         "process.accuracy.objective_half_width": "until it is so sure; of a time: this share",
     }
 
-    bores = find_bores(mesh, target.triangles)
-    # Balls would lie on what holds an end at the side: it goes out through the wall instead.
-    out = end.axis if end is not None and wanted.pose in AT_SIDE else None
     goes_out = out is not None
 
     def built(is_local: bool, turning: Bore | None = None) -> tuple[Proposal, Floor]:
@@ -301,7 +349,8 @@ def _proposed(
         for number, wider in enumerate(WIDER):
             progress(number, len(WIDER), None)
             try:
-                placed, floor = _place(mesh, target, pose, diameter, form, wider, is_local, out)
+                placed, floor = _place(shape, pose, diameter, form, wider, is_local, out)
+                floor = floor._replace(settings=end.settings if end is not None else 1)
                 part = {**tables["part"], "rotate_deg": list(placed)}
                 if any(floor.offset_mm):
                     part["offset_mm"] = list(floor.offset_mm)
@@ -344,8 +393,6 @@ def _proposed(
             made = held(made, floor, target, above, bores, wanted.shop, progress)
     elif "holder" not in made.tables:
         made = clamped_outside(made, floor, wanted.shop)
-    may_turn = wanted.may_turn and wanted.pose is None
-    turning = turning_bore(bores, mesh, target.triangles) if may_turn else None
     if turning is not None:
         with step("trying it on its axis, turning") as progress, suppress(InputError):
             other, its_floor = built(is_local=False, turning=turning)
@@ -479,8 +526,7 @@ def _part_alone(tables: Tables) -> Part:
 
 
 def _place(
-    mesh: PartMesh,
-    target: Target,
+    part: Shape,
     turns: Turns,
     ball: float,
     wanted: Wanted,
@@ -503,30 +549,30 @@ def _place(
     Raises:
         InputError: the shop has no sonotrode for it, or no chamber so large.
     """
-    square, found = square_to_walls(mesh.vertices, turns), []
+    square, found = square_to_walls(part.vertices, turns), []
     if out is not None:
         square = end_to_wall(turns, out)
-    suits = shape_for(np.ptp(mesh.vertices @ rotation_matrix(square).T, axis=0))
+    suits = shape_for(np.ptp(part.vertices @ rotation_matrix(square).T, axis=0))
     refused: InputError | None = None
     usual = ["box"] if is_local else ["cylinder", suits]
     for shape in dict.fromkeys([wanted.shape] if wanted.shape else usual):
         placed = square if shape == "box" else turns
-        posed = mesh.vertices @ rotation_matrix(placed).T
+        posed = part.vertices @ rotation_matrix(placed).T
         posed[:, 2] -= posed[:, 2].min()
-        on_target = posed[np.unique(mesh.triangles[target.triangles])]
+        on_target = posed[np.unique(part.triangles[part.target])]
         top, around = float(on_target[:, 2].max()), on_target if is_local else None
         sizes, shop = propose_sizes(posed, top, ball, shape, wider, around), wanted.shop
         out_at = sizes.height - sizes.distance
         if (
             sizes.through_ceiling
             and not is_local
-            and not can_be_clamped(posed, mesh.triangles, 2, out_at)
+            and not can_be_clamped(posed, part.triangles, 2, out_at)
         ):  # a higher ceiling takes in the whole part
             sizes = propose_sizes(posed, float(posed[:, 2].max()), ball, shape, wider)
         local = None
         if is_local and shape == "box":
             at_wall = None if out is None else AT_WALL * wider * ball
-            local = local_room(posed, mesh.triangles, target.triangles, sizes, at_wall)
+            local = local_room(posed, part.triangles, part.target, sizes, at_wall)
             sizes = local.sizes
         try:
             floor = floor_on_sonotrode(
@@ -534,11 +580,11 @@ def _place(
             )
             lowest = 0.0
             if local is not None:
-                lowest = lowest_over(posed, mesh.triangles, local.plan(floor.sizes))
+                lowest = lowest_over(posed, part.triangles, local.plan(floor.sizes))
                 floor = floor._replace(sizes=local.as_low_as(floor.sizes, lowest))
                 below = lowest - floor.sizes.distance
                 floor = clear_of_face(
-                    floor, posed, mesh.triangles, local.middle(floor.sizes), below
+                    floor, posed, part.triangles, local.middle(floor.sizes), below
                 )
             if shop is not None:
                 room, highest = require_room(floor.sizes, shop), float(posed[:, 2].max()) - lowest
@@ -558,6 +604,22 @@ def _place(
     return min(found, key=lambda one: one[1].excess)
 
 
+def _can_be_mounted(
+    part: Shape, turns: Turns, ball: float, wanted: Wanted, out: np.ndarray | None
+) -> bool:
+    """Return whether as many sonotrodes as a shop mounts carry a chamber for all of a target.
+
+    Args:
+        part, turns, ball, wanted, out: as of _place.
+    """
+    for is_local in {True, out is not None}:
+        with suppress(InputError):
+            _, floor = _place(part, turns, ball, wanted, 1.0, is_local, out)
+            if floor.face is not None and floor.stand.face.count <= SEVERAL:
+                return True
+    return False
+
+
 def _hanging(
     mesh: PartMesh, target: Target, turns: Turns, ball: float, wanted: Wanted
 ) -> Turns | None:
@@ -567,13 +629,15 @@ def _hanging(
         turns, ball, wanted: as of _place.
     """
 
+    whole = Shape(mesh.vertices, mesh.triangles, target.triangles)
+
     def is_carried(pose: Turns) -> bool:
         try:
-            return _place(mesh, target, pose, ball, wanted, 1.0)[1].is_one_sonotrode
+            return _place(whole, pose, ball, wanted, 1.0)[1].is_one_sonotrode
         except InputError:
             return False
 
-    hanging = hanging_pose(mesh.vertices, mesh.triangles, target.triangles, turns)
+    hanging = hanging_pose(*whole, turns)
     needed = hanging is not None and not is_carried(turns) and is_carried(hanging)
     return hanging if needed else None
 

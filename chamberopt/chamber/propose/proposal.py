@@ -109,6 +109,7 @@ class Proposal:
     warnings: tuple[str, ...]
     jams: tuple[JamGap, ...]  # gaps of chamber and part in which the balls jam
     sonotrode: ShopSonotrode  # whose face carries the chamber
+    settings: int = 1  # as of the floor
     # Of all replicas of a candidate [s], to know the time in which its target is covered; None if
     # no pilot ran, or balls do not touch enough of the target.
     search_time: float | None = None
@@ -174,6 +175,7 @@ def checked(
         warnings=found,
         jams=tuple(jam_gaps(chamber, diameter, gaps_in_reach(shot_reach(design, chamber)))),
         sonotrode=floor.stand.sonotrode,
+        settings=floor.settings,
     )
 
 

@@ -26,6 +26,7 @@ import numpy as np
 from chamberopt.chamber.propose.pose import Turns, turns_down
 from chamberopt.chamber.propose.proposed_target import Sizes, Target
 from chamberopt.design.shapes.outlines import area_inside
+from chamberopt.geometry.cut import cut_at_box, facets
 from chamberopt.geometry.heights import lowest_over
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import convex_hull
@@ -43,6 +44,8 @@ ONE_PIECE = 0.95  # least share of an end's area in one connected piece, which l
 TIP, STRAIGHT = 0.25, 0.8  # of an end: near its tip, and width there over that where it begins
 ALIKE = 0.05  # difference of that from which on it decides which end is held
 UPRIGHT = 0.999  # cosine from which on an axis of the part's file is one of the chamber's
+LEVEL = 1e-3  # cosine to the vertical below which it is level
+LARGE = 0.5  # least area of the strip that is proposed over the largest one's
 SLIMMER = 0.8  # area of the lower end over the upper one's, below which the part is turned over
 MARGIN_MM = 1.0  # of boxes round the part
 # Of an end that is clamped outside: length over its width, or [m], the shorter one, and what of it
@@ -60,7 +63,8 @@ NEAREST, INTO = 0.25, 0.5e-3
 class HeldEnd(NamedTuple):
     """An end of a part that is left out of its target, and a pose in which the part is held by it.
 
-    The end points up in the pose that is proposed with it.
+    The end points up in the pose, or goes out through the wall at +x. Of a target that is peened a
+    strip at a time, all beside the strip is left out.
     """
 
     target: Target  # the rest
@@ -68,6 +72,16 @@ class HeldEnd(NamedTuple):
     axis: np.ndarray  # unit vector of the part's file along which the end points, (3,)
     at: dict[str, Any]  # keys that choose the end
     triangles: np.ndarray  # marks those of the end, (m,)
+    goes_out: bool = False
+    settings: int = 1  # in which all of the target is peened, a strip of it in each
+
+
+class Shape(NamedTuple):
+    """Vertices (n, 3) [m] and triangles (m, 3) of a part, and marks of its target's, (m,)."""
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    target: np.ndarray
 
 
 def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False) -> HeldEnd | None:
@@ -151,6 +165,68 @@ def bare_end(mesh: PartMesh, target: Target, turns: Turns) -> HeldEnd | None:
     if not _is_one_piece(mesh, (way * own[mesh.triangles]).mean(axis=1) > cut):
         return None
     return HeldEnd(target, turns, way * np.eye(3)[axis], {}, of_end)
+
+
+def strip(mesh: PartMesh, target: Target, turns: Turns, longest: float) -> HeldEnd | None:
+    """Return a strip of a target, whose part goes out through the walls at the strip's ends.
+
+    The strips are equally long, across the axis of the part's file along which the part is longest.
+    The one nearest to the middle is taken that has much of the target. It is None where one strip
+    is all of the target, or the axis is not level in the pose.
+
+    Args:
+        turns: the pose [degrees].
+        longest: largest length of a strip [m].
+    """
+    axis = int(np.ptp(mesh.vertices, axis=0).argmax())
+    on_target = mesh.vertices[np.unique(mesh.triangles[target.triangles]), axis]
+    extent, low = float(np.ptp(on_target)), float(on_target.min())
+    count = math.ceil(extent / longest - 1e-9) if longest > 0.0 else 0
+    is_level = abs(rotation_matrix(turns)[2, axis]) < LEVEL
+    if count < 2 or not is_level or "box_mm" in target.keys:
+        return None
+    pitch = extent / count
+
+    def box(number: int) -> list[list[float]]:
+        corners = np.array(box_beyond(mesh, axis, True, 1e3 * (low + number * pitch)))
+        corners[1, axis] = round(1e3 * (low + (number + 1) * pitch), 3)
+        return [[float(x) for x in corner] for corner in corners]
+
+    def area_in(number: int) -> float:
+        cut = cut_shape(mesh, target.triangles, box(number))
+        return float(areas(cut.vertices, cut.triangles)[cut.target].sum())
+
+    each = [area_in(k) for k in range(count)]
+    like = [k for k in range(count) if each[k] > LARGE * max(each)]
+    chosen = min(like, key=lambda k: abs(2 * k + 1 - count))
+    places = mesh.vertices[mesh.triangles][..., axis]
+    inside = (places.max(axis=1) >= low + chosen * pitch) & (
+        places.min(axis=1) <= low + (chosen + 1) * pitch
+    )
+    reason = (
+        f"{target.reason}; A STRIP AT A TIME, in {count} settings: it is moved along the "
+        f"{'xyz'[axis]} of its file by {1e3 * pitch:.3g} mm of {1e3 * extent:.3g} mm between them, "
+        "and each takes the treatment time; where the part ends, a plate closes the chamber"
+    )
+    keys = {**target.keys, "box_mm": box(chosen), "cut": True}
+    of_strip = Target(keys, target.triangles & inside, reason)
+    return HeldEnd(of_strip, turns, np.eye(3)[axis], {}, ~inside, True, count)
+
+
+def cut_shape(mesh: PartMesh, target: np.ndarray, box_mm: list[list[float]] | None) -> Shape:
+    """Return a part with its target cut at a box, if there is one.
+
+    Args:
+        target: marks the triangles of the target before it is cut, (m,).
+        box_mm: low and high corner [mm].
+    """
+    if box_mm is None:
+        return Shape(mesh.vertices, mesh.triangles, target)
+    box = 1e-3 * np.array(box_mm)
+    cut = cut_at_box(facets(mesh.vertices, mesh.triangles), box, target)
+    middle = cut.vertices[cut.triangles].mean(axis=1)
+    inside = ((middle > box[0]) & (middle < box[1])).all(axis=1)
+    return Shape(cut.vertices, cut.triangles, target[cut.parent] & inside)
 
 
 def _is_one_piece(mesh: PartMesh, of_end: np.ndarray) -> bool:

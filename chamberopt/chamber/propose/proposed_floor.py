@@ -39,6 +39,7 @@ CLEAR = 1e-3  # m: least height of what is outside of the walls over the face
 OUTSIDE = f"outside of the walls the part stays {1e3 * CLEAR:g} mm above the sonotrode's face"
 MOST_RAISED = 1.0  # share of the distance by which it may grow for that
 HELD = 1e-9  # m: a floor that must move in by no more lies within a face
+SEVERAL = 3  # sonotrodes side by side that a shop would still mount
 LEAST_ROOM = 4.0  # ball diameters beside the part that save a sonotrode
 # A face up to so much larger than the wanted floor becomes the whole floor: of one sonotrode, and
 # of blocks side by side, where an end without a part would only thin out the shot.
@@ -65,6 +66,7 @@ class Floor(NamedTuple):
     is_raised: bool = (
         False  # whether the part is higher to stay clear of the face outside the walls
     )
+    settings: int = 1  # of the part, one after the other, in which all of the target is peened
 
     @property
     def is_one_sonotrode(self) -> bool:

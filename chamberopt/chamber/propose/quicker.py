@@ -23,6 +23,7 @@ from chamberopt.chamber.propose.pose import AT_SIDE, Pose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, new_harm, with_charge
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS
 from chamberopt.chamber.propose.proposed_budget import LONG, Measured, TooSlowError
+from chamberopt.chamber.propose.proposed_floor import SEVERAL
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.triangles import rotation_matrix
@@ -31,7 +32,6 @@ SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways 
 # Time of all sonotrodes over that of the way before, below which a way is taken. Pilots know a time
 # to 10 to 20 %. A way is no weaker than this share of the intensity before.
 QUICKER, AS_STRONG, HALF = 0.8, 0.8, 0.5
-SEVERAL = 3  # sonotrodes side by side that a shop would still mount, to be spared a LONG time
 LAYER = 2.0  # over half a layer
 SAME = 0.999  # cosine between the directions that point up, from which on a pose is no other one
 
@@ -71,7 +71,7 @@ def propose_quicker(
                 continue
             harm, found = _harm(made, first.made), None
             try:
-                found = None if harm else measure(made, longest_of_choice(best.found))
+                found = None if harm else measure(made, _longest(made, best))
             except TooSlowError as error:
                 harm = str(error)
             one = Way(made, wanted, found)
@@ -84,7 +84,7 @@ def propose_quicker(
         made = with_charge(best.made, LAYER)
         found = None
         with suppress(TooSlowError):
-            found = measure(made, longest_of_choice(best.found))
+            found = measure(made, _longest(made, best))
         if _is_quicker(Way(made, best.wanted, found), best):
             reason = (
                 f"a whole layer of balls on the sonotrode: {made.design.shot.count}; by pilots "
@@ -101,9 +101,11 @@ def _needs_both_sides(one: Way, pose: Pose) -> bool:
     return one.wanted.pose == pose and (is_rough or rests(one.made))
 
 
-def longest_of_choice(found: Measured | None) -> float:
-    """Return the time to 98 % [s] from which on no other way is taken instead of a measured one."""
-    return math.inf if found is None else QUICKER * found.time_to_98
+def _longest(made: Proposal, best: Way) -> float:
+    """Return the time to 98 % [s] of a setting from which on a way is not taken instead of one."""
+    if best.found is None:
+        return math.inf
+    return QUICKER * best.found.time_to_98 * best.made.settings / made.settings
 
 
 def _is_slow(way: Way) -> bool:
@@ -137,6 +139,7 @@ def _is_quicker(one: Way, other: Way) -> bool:
 def _objection(one: Way, found: Measured, other: Way, of_other: Measured) -> str:
     """Return in words why a way is not worth taking instead of another one; empty if it is.
 
+    What counts is the time of all settings in which the target is peened.
     A way on twice as many sonotrodes, which have to vibrate alike, has to take half of the time. Up
     to SEVERAL do if it takes half of a time that nobody would run.
 
@@ -146,14 +149,17 @@ def _objection(one: Way, found: Measured, other: Way, of_other: Measured) -> str
     now, then = found.intensity, of_other.intensity
     if now is not None and then is not None and now.value < AS_STRONG * then.value:
         return "weaker"
+    time, other_time = (
+        x.time_to_98 * way.made.settings for x, way in ((found, one), (of_other, other))
+    )
     if (
         of_other.time_to_98 > LONG
         and one.made.sonotrode_count <= SEVERAL
-        and found.time_to_98 < HALF * of_other.time_to_98
+        and time < HALF * other_time
     ):
         return ""
     ratio = max(one.made.sonotrode_count / other.made.sonotrode_count, 1.0)
-    if ratio * found.time_to_98 < QUICKER * of_other.time_to_98:
+    if ratio * time < QUICKER * other_time:
         return ""
     return "hardly quicker" if ratio == 1.0 else "not quick enough for more sonotrodes"
 
@@ -182,6 +188,7 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
                 what += f" ({why})"
         count = one.made.sonotrode_count
         on, taken = f" on {count} sonotrodes" if count > 1 else "", " (taken)" * (one is best)
+        on += f" in {one.made.settings} settings" if one.made.settings > 1 else ""
         texts.append(f"{name}{on}: {what}{taken}")
     if len(texts) == 1:
         return best

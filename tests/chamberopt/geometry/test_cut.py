@@ -2,19 +2,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.geometry.cut import cut_at_box, piece_beyond
+from chamberopt.geometry.cut import cut_at_box, facets, piece_beyond
 from chamberopt.geometry.smoothing.divide import Surface
-from chamberopt.geometry.triangles import areas, edge_keys, unit_normals
+from chamberopt.geometry.triangles import areas, edge_keys
 
 
 def surface_of(mesh: trimesh.Trimesh) -> Surface:
-    """The mesh with the normals of its facets at their corners."""
-    count = len(mesh.faces)
-    normals = np.repeat(unit_normals(mesh.vertices[mesh.faces])[:, None], 3, axis=1)
-    of_crease = np.zeros((count, 3), dtype=bool)
-    triangles = np.asarray(mesh.faces)
-    vertices = np.asarray(mesh.vertices)
-    return Surface(vertices, triangles, np.arange(count), normals, of_crease, np.zeros(count))
+    return facets(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
 def area_inside(surface: Surface, box: np.ndarray) -> float:

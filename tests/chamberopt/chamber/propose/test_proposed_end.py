@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from manifold3d import Manifold
+from manifold3d import Manifold, Mesh
 
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Wanted
@@ -15,10 +15,14 @@ from chamberopt.chamber.propose.proposed_end import (
     bare_end,
     can_be_clamped,
     closing_faces,
+    cut_shape,
     local_room,
+    strip,
 )
 from chamberopt.chamber.propose.proposed_mask import rows_of
 from chamberopt.chamber.propose.proposed_target import Target, propose_sizes
+from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.triangles import areas
 from tests.chamberopt.chamber.propose.test_proposed_arbor import drum, part_of
 from tests.helpers.eight_parts import EIGHT_PARTS
 
@@ -152,6 +156,62 @@ def test_a_blade_on_edge_goes_out_by_its_root(tmp_path: Path) -> None:
     inside = made.chamber.exposed_area > 0.0
     assert inside[made.chamber.part.target].all()
     assert "the part itself is the wall" in made.reasons["chamber.length_mm"]
+
+
+def of_area(mesh: PartMesh, target: np.ndarray, box: list[list[float]] | None) -> float:
+    """Area [mm²] of a target that is cut at a box."""
+    cut = cut_shape(mesh, target, box)
+    return 1e6 * float(areas(cut.vertices, cut.triangles)[cut.target].sum())
+
+
+@pytest.mark.parametrize("finer", [0, 2])
+@pytest.mark.parametrize(("longest", "count"), [(60.0, 7), (200.0, 2), (399.0, 2)])
+def test_strips_of_a_target_are_equal_however_it_is_divided(
+    finer: int, longest: float, count: int
+) -> None:
+    """Those of a bar's broad sides, of 400 by 40 mm, each have as much of them."""
+    body = trimesh.creation.box((400.0, 40.0, 20.0))
+    for _ in range(finer):
+        body = body.subdivide()
+    made = Mesh(body.vertices.astype(np.float32), body.faces.astype(np.uint32))
+    mesh, body = part_of(Manifold(made))
+    sides = np.abs(body.face_normals[:, 1]) > 0.9
+    one = strip(mesh, Target({"faces": []}, sides, "sides"), UPRIGHT, 1e-3 * longest)
+    assert one is not None
+    assert one.settings == count
+    assert np.abs(one.axis).argmax() == 0
+    box = one.target.keys["box_mm"]
+    assert box[1][0] - box[0][0] == pytest.approx(400.0 / count, abs=2e-3)
+    assert of_area(mesh, sides, None) == pytest.approx(2 * 400.0 * 20.0)
+    assert of_area(mesh, sides, box) == pytest.approx(2 * 400.0 * 20.0 / count, rel=1e-4)
+    assert f"in {count} settings" in one.target.reason
+
+
+def test_a_target_without_a_level_long_axis_or_that_fits_has_no_strip() -> None:
+    mesh, body = part_of(Manifold.cube((20.0, 40.0, 400.0)))
+    sides = np.abs(body.face_normals[:, 1]) > 0.9
+    target = Target({"faces": []}, sides, "sides")
+    assert strip(mesh, target, UPRIGHT, 60e-3) is None
+    assert strip(mesh, target, (0.0, 45.0, 0.0), 60e-3) is None
+    assert strip(mesh, target, (0.0, 90.0, 0.0), 401e-3) is None
+    assert strip(mesh, target, (0.0, 90.0, 0.0), 399e-3) is not None
+
+
+def test_what_no_sonotrode_carries_is_peened_a_strip_at_a_time(tmp_path: Path) -> None:
+    """The edges of a plate of 600 mm: it goes out of a chamber on one sonotrode at both ends."""
+    part = tmp_path / "plate.stl"
+    trimesh.creation.box((600.0, 110.0, 50.0)).export(part)
+    made = propose(part, Wanted("mm", alloy="2024-T351"), lambda _: ["face 2"])
+    whole = 2 * 600.0 * 50.0
+    assert made.settings > 5
+    assert made.sonotrode_count == 1
+    assert made.design.holder is not None
+    assert made.design.holder.kind == "bore"
+    assert not made.jams
+    posed = made.chamber.part
+    inside = made.chamber.exposed_area[posed.target].sum()
+    assert 1e6 * inside * made.settings == pytest.approx(whole, rel=1e-3)
+    assert "A STRIP AT A TIME" in made.reasons["part.target"]
 
 
 def test_a_crank_pin_gets_a_chamber_between_its_webs(tmp_path: Path) -> None:
