@@ -266,6 +266,8 @@ def larger_instead(
     """
     if now.found is None or now.found.intensity is None or gives(intensity, now.found):
         return None
+    if not others:
+        return None
     here, fits = setting_of(now.made), {one.ball_mm: one.fit for one in trials}
     fit = fits[here.ball_mm]
     for one in sorted(others, key=lambda one: setting_of(one.made).ball_mm):

@@ -454,6 +454,7 @@ def test_larger_balls_are_taken_that_give_the_intensity_and_are_no_slower(
         Compared(larger, None, "balls jam in a gap"),
     ):
         assert larger_instead(now, [other], trials, asked) is None
+    assert larger_instead(now, [], (), asked) is None  # no other size could be tried
     enough = Compared(made, pilot_of(0.12, 600.0))
     assert larger_instead(enough, [good], trials, asked) is None
     # The smallest that does it is taken.
