@@ -331,6 +331,9 @@ def local_room(
     """
     on_target = posed[np.unique(triangles[target])]
     faces = closing_faces(posed, triangles, target, sizes.gap) + BEHIND * np.array([[-1.0], [1.0]])
+    if at_wall is not None:  # a wall of its own is nearer than such a face
+        ends = np.array([on_target.min(axis=0)[0], on_target.max(axis=0)[0]])
+        faces[np.abs(faces[:, 0] - ends) > at_wall, 0] = np.nan
     walls = np.array([on_target.min(axis=0) - sizes.gap, on_target.max(axis=0) + sizes.gap])
     near = np.zeros(2, dtype=bool)  # walls along x through which an end goes out
     if at_wall is not None:

@@ -221,7 +221,7 @@ def moved_openings(chamber: Chamber) -> str:
             like = [x for x in other if x.wall == one.wall]
             near = min(like, key=lambda x: _moved_mm(one, x), default=None)
             if near is None or _moved_mm(one, near) > MOVED_MM:
-                before, after = (x and format_point(np.array(x.place)) for x in (one, near))
+                before, after = (x and format_point(np.round(x.place, 4)) for x in (one, near))
                 return (
                     f"OPENINGS MOVE in the second pose, one from {before} to {after or 'none'}: a "
                     "second wall or insert, and jaws that suit it"

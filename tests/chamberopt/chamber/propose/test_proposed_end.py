@@ -12,6 +12,7 @@ from manifold3d import Manifold, Mesh
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.propose.proposed_end import (
+    Shape,
     bare_end,
     can_be_clamped,
     closing_faces,
@@ -76,6 +77,27 @@ def test_small_or_far_faces_close_no_chamber() -> None:
         raised[shared] = mesh.vertices[shared]
         is_wall = np.isfinite(closing_faces(raised, mesh.triangles, pin, 2e-3)[1, 2])
         assert is_wall == (web == 60.0 and far == 0.0)
+
+
+def test_a_face_beyond_the_wall_of_a_strip_closes_no_chamber() -> None:
+    """Webs close a chamber where the whole pin is peened, and not that of its middle 10 mm."""
+    mesh, body = part_of(crank(30.0))
+    radius = np.linalg.norm(body.triangles_center[:, :2], axis=1)
+    pin = (radius < 8.01) & (np.abs(body.face_normals[:, 2]) < 0.1)
+    lying = mesh.vertices[:, [2, 0, 1]] + [0, 0, 30e-3]  # the pin along x
+    box = [[-31.0, -31.0, -5.0], [31.0, 31.0, 5.0]]
+    middle = cut_shape(mesh, pin, box)
+    for shape, at_wall, closed in (
+        (Shape(mesh.vertices, mesh.triangles, pin), 3e-3, ("-x", "x")),
+        (middle, 3e-3, ()),
+        (middle, 12e-3, ("-x", "x")),
+    ):
+        posed = shape.vertices[:, [2, 0, 1]] + [0, 0, 30e-3]
+        on_target = posed[np.unique(shape.triangles[shape.target])]
+        sizes = propose_sizes(lying, 38e-3, 5e-3, "box", 1.0, on_target)
+        assert sizes.gap > 10e-3
+        room = local_room(posed, shape.triangles, shape.target, sizes, at_wall)
+        assert room.sizes.closed == closed
 
 
 def test_a_wall_at_a_face_stays_there_as_the_floor_grows() -> None:
