@@ -161,6 +161,9 @@ PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 # Such features are at least this share of the part's area, and stand round an axis: the variances
 # of their middles along both axes of their plane differ by less than RING.
 LARGE_PATTERN, RING = 0.1, 0.1
+# A face of less than TINY of the part's area is a facet rather than a face. Where facets are more
+# than FACETTED of it, its mesh is too coarse for such edges, and sharper ones are tried [degrees].
+TINY, FACETTED, SHARPER_DEG = 1e-3, 0.2, (45.0, 60.0)
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
 BY_PROGRAM = re.compile(r"(?:created|exported|generated|written)[\s_-]+(?:by|from|with)\b", re.I)
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
@@ -295,9 +298,28 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
     return _joined(large, by_size("the largest between sharp edges", faces[len(large) :]))
 
 
+def crease_deg(mesh: PartMesh) -> float:
+    """Return the angle of the edges between the faces of a part [degrees]: CREASE_DEG or sharper.
+
+    It is the least at which few of the faces are facets; the sharpest if none is.
+    """
+    tried = CREASE_DEG, *SHARPER_DEG
+    return next((one for one in tried if not _are_facets(mesh, one)), tried[-1])
+
+
+def _are_facets(mesh: PartMesh, crease: float) -> bool:
+    """Return whether much of a part lies in faces too small to be faces.
+
+    Args:
+        crease: angle of the edges at which it is parted [degrees].
+    """
+    area = mesh.faces(crease).area
+    return bool(area[area < TINY * area.sum()].sum() > FACETTED * area.sum())
+
+
 def _is_ring(mesh: PartMesh, alike: Surface) -> bool:
     """Return whether faces that are alike stand evenly round an axis."""
-    faces = mesh.faces(CREASE_DEG)
+    faces = mesh.faces(crease_deg(mesh))
     of, own = faces.of_triangle[alike.triangles], areas(mesh.vertices, mesh.triangles)
     weight = own[alike.triangles]
     middle = mesh.vertices[mesh.triangles[alike.triangles]].mean(axis=1)
@@ -320,10 +342,13 @@ def _is_inside(mesh: PartMesh, face: Surface) -> bool:
 def _faces(mesh: PartMesh) -> list[Surface]:
     """Return the faces between sharp edges, the largest first, as surfaces.
 
-    Faces that are alike are one surface.
+    Faces that are alike are one surface. Facets of a mesh that is too coarse are left out.
     """
-    faces = mesh.faces(CREASE_DEG)
+    crease = crease_deg(mesh)
+    faces = mesh.faces(crease)
     left, found = np.ones(faces.count, dtype=bool), []
+    if _are_facets(mesh, crease):
+        left = faces.area > TINY * faces.area.sum()
     for face in np.argsort(-faces.area, kind="stable"):
         if left[face]:
             same = faces.alike(face) & left
@@ -334,7 +359,7 @@ def _faces(mesh: PartMesh) -> list[Surface]:
     taken = {name.lower() for name in mesh.groups}  # a name of the file goes first
     free = (name for number in count(1) if (name := f"face {number}") not in taken)
     for (area, face, same), name in zip(found[:MAX_KINDS], free, strict=False):
-        key: dict[str, object] = {"at_mm": faces.place_mm(face), "crease_deg": CREASE_DEG}
+        key: dict[str, object] = {"at_mm": faces.place_mm(face), "crease_deg": crease}
         several = int(same.sum())
         if several > 1:
             key["alike"] = True
@@ -407,12 +432,12 @@ def _hollow_curvature(mesh: PartMesh) -> np.ndarray:
 
 def _single(mesh: PartMesh, of: Surface, number: int) -> Surface | None:
     """Return one of several faces that are alike, by its number from 1; None if there is none."""
-    faces = mesh.faces(CREASE_DEG)
+    faces = mesh.faces(crease_deg(mesh))
     own = np.unique(faces.of_triangle[of.triangles])
     if not 1 <= number <= len(own):
         return None
     face = int(own[number - 1])
-    key: dict[str, object] = {"at_mm": faces.place_mm(face), "crease_deg": CREASE_DEG}
+    key: dict[str, object] = {"at_mm": faces.place_mm(face), "crease_deg": crease_deg(mesh)}
     marked = faces.of_triangle == face
     return Surface(
         f"{of.name}.{number}", {"faces": [key]}, marked, area_in_mm2(float(faces.area[face]))
