@@ -16,6 +16,9 @@ from chamberopt.geometry.triangles import (
 )
 
 SAME = 0.02  # relative difference of size and extent below which faces count as alike
+# A face of less than TINY of the whole area is a facet rather than a face. Where facets are more
+# than FACETED of the area, the surface is too coarse to be parted at such edges.
+TINY, FACETED = 1e-3, 0.2
 
 
 class Faces:
@@ -45,6 +48,12 @@ class Faces:
         self._corners, self._normal = vertices[triangles], normal
         self._weight = areas(vertices, triangles)
         self.area = np.bincount(self.of_triangle, self._weight)  # [m²], (count,)
+
+    @property
+    def are_facets(self) -> np.ndarray:
+        """Marks the faces too small to be faces, (count,); none where they are little in all."""
+        tiny = self.area < TINY * self.area.sum()
+        return np.asarray(tiny & (self.area[tiny].sum() > FACETED * self.area.sum()))
 
     def at(self, place: np.ndarray) -> tuple[int, float]:
         """Return the number of the face closest to a point (3,) [m], and its distance [m]."""

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chamberopt.design.shape_surface import TAG_WALL, is_sonotrode
+from chamberopt.geometry.faces import Faces
 from chamberopt.pictures.charts.colours import (
     FEW_DENTS,
     FIXTURE_COLOURS,
@@ -20,7 +21,7 @@ from chamberopt.pictures.charts.colours import (
     zone_colour,
 )
 from chamberopt.pictures.drawn_part import DrawnPart
-from chamberopt.results.vtp_files import Surface, fixture_marks, pyvista
+from chamberopt.results.vtp_files import Surface, fixture_body, fixture_marks, pyvista
 
 DARK, BACKGROUND = "#2b3440", "white"
 FAULT, PALE = "#d01c1c", "#c8b0dc"
@@ -125,16 +126,11 @@ def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[An
     for tag in np.unique(tags[is_sonotrode(tags)]):
         face = chamber.extract_cells(tags == tag).extract_surface(algorithm="dataset_surface")
         faces[int(tag)] = plotter.add_mesh(face, color=SONOTRODE, lighting=False, **style)
-    fixtures, glass, actors = fixture_marks(chamber), tags == TAG_WALL, []
-    for name, own in fixtures.items():
+    glass, actors = tags == TAG_WALL, []
+    for name, own in fixture_marks(chamber).items():
         glass &= ~own
-        body = chamber.extract_cells(own).extract_surface(algorithm="dataset_surface")
-        body = pyvista().PolyData.from_regular_faces(  # with its normals into the cavity
-            body.points, np.asarray(body.regular_faces)[:, ::-1]
-        )
-        body = body.fill_holes(body.length)  # where it goes on in the wall or lies on the part
         look = {"color": FIXTURE_COLOURS[name], "ambient": 0.45, "diffuse": 0.6, **style}
-        actors.append(plotter.add_mesh(body, **look))
+        actors.append(plotter.add_mesh(fixture_body(chamber, name), **look))
     wall = chamber.extract_cells(glass).extract_surface(algorithm="dataset_surface")
     edges = wall.extract_feature_edges(SHARP_EDGE, non_manifold_edges=False, manifold_edges=False)
     return faces, [
@@ -145,8 +141,14 @@ def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[An
 
 
 def add_edges(plotter: Any, part: Surface) -> None:
-    """Add the sharp edges of a part to a plotter as thin lines."""
+    """Add the sharp edges of a part to a plotter as thin lines.
+
+    Those between the facets of a coarse mesh, which would blacken it, are left out.
+    """
     whole = pyvista().PolyData(part.points, part.faces).clean()
+    faces = Faces(np.asarray(whole.points), np.asarray(whole.regular_faces), float(SHARP_EDGE))
+    if (facets := faces.are_facets[faces.of_triangle]).any():
+        whole = whole.extract_cells(~facets).extract_surface(algorithm="dataset_surface")
     edges = whole.extract_feature_edges(
         SHARP_EDGE, boundary_edges=False, non_manifold_edges=False, manifold_edges=False
     )

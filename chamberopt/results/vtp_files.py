@@ -31,6 +31,7 @@ OF_ELEMENT = {
 }
 ZONE = "zone"  # a column of both files, in results with zones
 FIXTURES = {"holder": 1, "mask": 2}  # numbers of the cell data "fixture" in chamber.vtp
+FIXTURE_BODY = "{}_points", "{}_triangles"  # field data of chamber.vtp: their closed surfaces
 MM = 1e3
 
 Surface = Any
@@ -81,6 +82,9 @@ def cavity_surface(chamber: Chamber) -> Surface:
     fitting: number of its hole, deflector, holder or mask (fitting), -1 for none. Only
         chambers with fittings have this value.
     fixture: 1 on the holder, 2 on the mask, 0 elsewhere. Only chambers with either have this value.
+
+    The closed surfaces of holder and mask, which also lie on walls and part, are its field data, as
+    points [mm] and triangles.
     """
     fields = {"tag": chamber.tags, "source": chamber.source}
     if chamber.fitting is not None:
@@ -88,7 +92,18 @@ def cavity_surface(chamber: Chamber) -> Surface:
     if chamber.fixtures:
         marks = sum(number * chamber.on_fixture(name) for name, number in FIXTURES.items())
         fields["fixture"] = np.asarray(marks, dtype=np.uint8)
-    return _surface(chamber.vertices, chamber.triangles, fields)
+    surface = _surface(chamber.vertices, chamber.triangles, fields)
+    for name, one in chamber.fixtures.items():
+        points, triangles = (key.format(name) for key in FIXTURE_BODY)
+        surface.field_data[points] = one.vertices * MM
+        surface.field_data[triangles] = one.triangles
+    return surface
+
+
+def fixture_body(cavity: Surface, name: str) -> Surface:
+    """Return the closed surface [mm] of a cavity's holder or mask."""
+    points, triangles = (np.asarray(cavity.field_data[key.format(name)]) for key in FIXTURE_BODY)
+    return pyvista().PolyData.from_regular_faces(points, triangles)
 
 
 def fixture_marks(cavity: Surface) -> dict[str, np.ndarray]:

@@ -161,9 +161,7 @@ PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 # Such features are at least this share of the part's area, and stand round an axis: the variances
 # of their middles along both axes of their plane differ by less than RING.
 LARGE_PATTERN, RING = 0.1, 0.1
-# A face of less than TINY of the part's area is a facet rather than a face. Where facets are more
-# than FACETTED of it, its mesh is too coarse for such edges, and sharper ones are tried [degrees].
-TINY, FACETTED, SHARPER_DEG = 1e-3, 0.2, (45.0, 60.0)
+SHARPER_DEG = 45.0, 60.0  # of edges, where those of CREASE_DEG part a coarse mesh into facets
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
 BY_PROGRAM = re.compile(r"(?:created|exported|generated|written)[\s_-]+(?:by|from|with)\b", re.I)
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
@@ -304,17 +302,7 @@ def crease_deg(mesh: PartMesh) -> float:
     It is the least at which few of the faces are facets; the sharpest if none is.
     """
     tried = CREASE_DEG, *SHARPER_DEG
-    return next((one for one in tried if not _are_facets(mesh, one)), tried[-1])
-
-
-def _are_facets(mesh: PartMesh, crease: float) -> bool:
-    """Return whether much of a part lies in faces too small to be faces.
-
-    Args:
-        crease: angle of the edges at which it is parted [degrees].
-    """
-    area = mesh.faces(crease).area
-    return bool(area[area < TINY * area.sum()].sum() > FACETTED * area.sum())
+    return next((one for one in tried if not mesh.faces(one).are_facets.any()), tried[-1])
 
 
 def _is_ring(mesh: PartMesh, alike: Surface) -> bool:
@@ -346,9 +334,7 @@ def _faces(mesh: PartMesh) -> list[Surface]:
     """
     crease = crease_deg(mesh)
     faces = mesh.faces(crease)
-    left, found = np.ones(faces.count, dtype=bool), []
-    if _are_facets(mesh, crease):
-        left = faces.area > TINY * faces.area.sum()
+    left, found = ~faces.are_facets, []
     for face in np.argsort(-faces.area, kind="stable"):
         if left[face]:
             same = faces.alike(face) & left
