@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, open_plain, write_bytes
-from chamberopt.common.key_words import inner_first, title, title_with_unit, unit_of
+from chamberopt.common.key_words import inner_first, key_in_words, title, title_with_unit, unit_of
 from chamberopt.common.limits import MAX_TEXT_BYTES
 from chamberopt.common.toml_errors import text_choices
 from chamberopt.common.toml_fields import read_toml
@@ -47,6 +47,9 @@ FACETS, ACCURACY = "chamber.facets", "process.accuracy"  # a number, and where i
 PROPOSED = "proposed by `chamberopt new`"
 CHANGED = "changed by you; proposed was "  # and the value, before the reason behind that
 TO_SETTLE = "to_settle"  # from which the page takes out what is settled
+# What is to be settled of a proposal is told of these; a matter says which of them were changed.
+OF_MATTERS = re.compile(r"(part|chamber|sonotrode|shot|holder|mask|materials)\.")
+SINCE, ADVICE = "CHANGED SINCE IT WAS PROPOSED: ", "; settle what else is listed if it still holds"
 # Keys that the page changes beside its fields: zones, and the faces of target, zone or fixture.
 PICKED = re.compile(
     r"(part\.target|zones\.\d+\.target|holder\.at|mask\.at)"
@@ -143,6 +146,7 @@ class EditedFile:
         if self.is_proposed:
             for name in changes.keys() & known:
                 _keep_reason_true(tomlkit.parse(self.text), document, name)
+            _keep_matters_true(document, changes)
         return tomlkit.dumps(document) if changes else self.text
 
     @property
@@ -297,6 +301,23 @@ def _keep_reason_true(before: Any, after: Any, name: str) -> None:
         proposed, _, reason = reason.removeprefix(CHANGED).partition(": ")
     is_back = after.as_string() == proposed
     after.trivia.comment = f"# {reason}" if is_back else f"# {CHANGED}{proposed}: {reason}"
+
+
+def _keep_matters_true(document: Any, changes: Changes) -> None:
+    """Let what is to be settled say which values that it was told of were changed.
+
+    Args:
+        document: the parsed file as it would be.
+    """
+    matters = document.get(TO_SETTLE, [])
+    found = [one for one in matters if one.startswith(SINCE)]
+    names = found[0][len(SINCE) : -len(ADVICE)].split(", ") if found else []
+    changed = [".".join(name.split(".")[:2]) for name in sorted(changes) if OF_MATTERS.match(name)]
+    names += [key_in_words(name) for name in changed]
+    if found:
+        matters.remove(found[0])
+    if names and len(matters):
+        matters.insert(0, f"{SINCE}{', '.join(dict.fromkeys(names))}{ADVICE}")
 
 
 def alloy_suggestions() -> list[tuple[str, str]]:

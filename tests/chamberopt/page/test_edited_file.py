@@ -54,6 +54,29 @@ def test_the_reason_of_a_changed_number_says_of_what_it_was(file: EditedFile) ->
         assert rows["chamber.height_mm"]["reason"] == [comment]
 
 
+def test_what_is_to_be_settled_says_which_values_it_was_told_of(file: EditedFile) -> None:
+    """What was changed is said once, until all is settled; the accuracy decides none of it."""
+    text = 'to_settle = [\n  "NOT MASKED: ask",\n  "LONG",\n]\n' + file.path.read_text()
+    file.path.write_text(text)
+    EditedFile(file.path, False).save({"chamber.height_mm": 31})
+    assert EditedFile(file.path, False).design.to_settle == ("NOT MASKED: ask", "LONG")
+    file.path.write_text(f"# A first chamber, proposed by `chamberopt new`: rules.\n{text}")
+    EditedFile(file.path, False).save({"process.accuracy.max_replicas": 9})
+    assert EditedFile(file.path, False).design.to_settle == ("NOT MASKED: ask", "LONG")
+    faces = [{"at_mm": [0, 0, -8]}]
+    for changes, words in (
+        ({"chamber.height_mm": 31, "to_settle": ["LONG"]}, "height of the chamber"),
+        ({"part.target.faces": faces}, "height of the chamber, target of the part"),
+        ({"chamber.height_mm": 32}, "height of the chamber, target of the part"),
+    ):
+        EditedFile(file.path, False).save(changes)
+        said, other = EditedFile(file.path, False).design.to_settle
+        assert said.startswith(f"CHANGED SINCE IT WAS PROPOSED: {words}; settle what")
+        assert other == "LONG"
+    EditedFile(file.path, False).save({"shot.mass_g": 2, "to_settle": [said]})
+    assert EditedFile(file.path, False).design.to_settle == ()
+
+
 @pytest.mark.parametrize(
     ("changes", "written"),
     [
