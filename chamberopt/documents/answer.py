@@ -22,6 +22,8 @@ from chamberopt.search.study.constraints import MET
 if TYPE_CHECKING:
     from chamberopt.results.load import Result
 
+MOSTLY = 0.95  # share of the target from which on balls count as getting to all of it
+
 
 def answer_in(folder: Path) -> str:
     """Return the answer of the result of a study or simulation in a folder, in one sentence.
@@ -45,9 +47,11 @@ def answer(result: Result, start: Result | None) -> str:
         mean = metric_label("mean_coverage")
         treatment_time = result.design.process.treatment_time
         if result.metrics["mean_coverage"].in_words == NOT_RESOLVED:
+            share = result.record.field.reachable_share
+            only = f"Balls get to {share:.0%} of the target. " if share < MOSTLY else ""
             return (
-                "Too few dents were simulated to tell how much of the target is covered after "
-                f"{plain(treatment_time)} s."
+                f"{only}Too few dents were simulated to tell how much of the target is covered "
+                f"after {plain(treatment_time)} s."
             )
         text = (
             f"After {plain(treatment_time)} s the target is covered to "
@@ -91,8 +95,11 @@ def answer(result: Result, start: Result | None) -> str:
 
 def on_average(result: Result) -> str:
     """Return a line on a result: the time to 98 %, and the mean coverage."""
-    mean = metric_label("mean_coverage").format(result.metrics["mean_coverage"])
-    return f"{full_coverage(result)}; covered to {mean} on average"
+    mean = result.metrics["mean_coverage"]
+    if mean.in_words == NOT_RESOLVED:
+        return f"{full_coverage(result)}; its mean coverage is not resolved"
+    text = metric_label("mean_coverage").format(mean)
+    return f"{full_coverage(result)}; covered to {text} on average"
 
 
 def answer_lines(result: Result, start: Result | None = None) -> list[AnswerLine]:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.documents.answer import _ended_lines, answer, answer_lines
+from chamberopt.documents.answer import _ended_lines, answer, answer_lines, on_average
 from chamberopt.documents.study import influence_sentences, influences, tried_sentence
 from chamberopt.documents.wording import Label, objective_label
 from chamberopt.results.records import (
@@ -187,18 +187,21 @@ def test_a_gain_that_does_not_count_keeps_the_start(counts: float, keeps: bool) 
     assert ("; less than 30 s does not count." in said) == keeps
 
 
-def test_what_is_not_resolved_is_not_in_the_answer_as_a_number() -> None:
+@pytest.mark.parametrize(("reach", "only"), [(1.0, ""), (0.2, "Balls get to 20% of the target. ")])
+def test_what_is_not_resolved_is_not_in_the_answer_as_a_number(reach: float, only: str) -> None:
     unknown = Estimate(0.4, 0.1).not_known("not resolved")
     result: Any = SimpleNamespace(
         objective_name="uniform_coverage",
         objective=unknown,
         metrics={"mean_coverage": unknown},
         design=SimpleNamespace(process=SimpleNamespace(treatment_time=120.0)),
+        record=SimpleNamespace(field=SimpleNamespace(reachable_share=reach)),
         study=a_study(),
     )
     assert answer(result, None) == (
-        "Too few dents were simulated to tell how much of the target is covered after 120 s."
+        f"{only}Too few dents were simulated to tell how much of the target is covered after 120 s."
     )
+    assert "its mean coverage is not resolved" in on_average(result)
     assert answer(result, result).startswith("Too few dents were simulated to tell wheth")
 
 
