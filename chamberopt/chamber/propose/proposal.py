@@ -47,6 +47,7 @@ OF_AMPLITUDE = {"amplitude_um": 0.5 * PEAK_TO_VALLEY_UM, "amplitude_pv_um": PEAK
 OF_LENGTHS = "heights: ISO 2768-m; amplitude: SAE AMS 2580A; what they cost: simulate --tolerances"
 # Warnings of fillets, slots and gaps that are too narrow, and of what no ball touches.
 NOT_SERVED = re.compile(r"^shot of |^[\d.]+% of |no ball gets in there")
+CAN_JAM = re.compile(r"^balls of [\d.]+ mm can jam in ")  # warnings of which the gaps are counted
 Tables = dict[str, dict[str, Any]]
 """Tables of a design file by dotted name, as TOML values."""
 
@@ -212,12 +213,14 @@ def faults(made: Proposal) -> tuple[int, int]:
 def new_harm(made: Proposal, before: Proposal) -> str:
     """Return in words the harm that a proposal does and another one does not; empty if none.
 
-    A warning that holds in both steps, at another place in each, is no new one. That balls do not
-    get to some of the target is no harm: it counts in what they serve and touch.
+    A warning that holds in both steps, at another place in each, is no new one. Nor is a gap that
+    jams balls in the place of another one. That balls do not get to some of the target is no harm:
+    it counts in what they serve and touch.
     """
     known = {beginning(text) for text in before.warnings}
     of_steps = (re.sub(r"^step \w+: ", "", text) for text in made.warnings)
-    harms = (beginning(text) for text in of_steps if not NOT_SERVED.search(text))
+    told = (text for text in of_steps if not CAN_JAM.match(text))
+    harms = (beginning(text) for text in told if not NOT_SERVED.search(text))
     new = [text for text in harms if text not in known]
     jams = "balls jam in a gap" if len(made.jams) > len(before.jams) else ""
     return next(iter(new), jams)

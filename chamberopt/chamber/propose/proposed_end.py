@@ -40,6 +40,9 @@ from chamberopt.geometry.triangles import (
 
 NEARLY_ALL = 0.95  # share of the part's area from which on its target is all of it
 END, LONG_END = 0.15, 0.25  # length of the end over the part's, the latter if no end is straight
+# Of a stubby part, a holder grips this share of its width, and ends this share of its length before
+# the target.
+STUBBY, BESIDE = 0.25, 0.04
 ONE_PIECE = 0.95  # least share of an end's area in one connected piece, which leaves out specks
 TIP, STRAIGHT = 0.25, 0.8  # of an end: near its tip, and width there over that where it begins
 ALIKE = 0.05  # difference of that from which on it decides which end is held
@@ -121,6 +124,8 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
 
     # A straight end is held better than one that narrows to its tip, and a slim one better still.
     share = END if max(straight(1.0, END), straight(-1.0, END)) > STRAIGHT else LONG_END
+    across = float(np.ptp(np.delete(mesh.vertices, axis, axis=1), axis=0).min())
+    share = max(share, min(STUBBY * across / length + BESIDE, LONG_END))
     upper, lower = (straight(way, share) for way in (1.0, -1.0))
     slimmer = size(-1.0) < SLIMMER * size(1.0)
     if slimmer if abs(upper - lower) < ALIKE else lower > upper:
