@@ -208,10 +208,12 @@ def strip(mesh: PartMesh, target: Target, turns: Turns, longest: float) -> HeldE
     inside = (places.max(axis=1) >= low + chosen * pitch) & (
         places.min(axis=1) <= low + (chosen + 1) * pitch
     )
+    over = ", or turned end for end if its halves are alike" if count == 2 else ""
     reason = (
         f"{target.reason}; A STRIP AT A TIME, in {count} settings: it is moved along the "
-        f"{'xyz'[axis]} of its file by {1e3 * pitch:.3g} mm of {1e3 * extent:.3g} mm between them, "
-        "and each takes the treatment time; where the part ends, a plate closes the chamber"
+        f"{'xyz'[axis]} of its file by {1e3 * pitch:.3g} mm of {1e3 * extent:.3g} mm between them"
+        f"{over}, and each takes the treatment time; where the part ends, a plate closes the "
+        "chamber"
     )
     keys = {**target.keys, "box_mm": box(chosen), "cut": True}
     of_strip = Target(keys, target.triangles & inside, reason)

@@ -17,6 +17,7 @@ from chamberopt.chamber.propose.proposed_end import (
     can_be_clamped,
     closing_faces,
     cut_shape,
+    held_end,
     local_room,
     strip,
 )
@@ -178,6 +179,17 @@ def test_a_blade_on_edge_goes_out_by_its_root(tmp_path: Path) -> None:
     inside = made.chamber.exposed_area > 0.0
     assert inside[made.chamber.part.target].all()
     assert "the part itself is the wall" in made.reasons["chamber.length_mm"]
+
+
+@pytest.mark.parametrize(("long", "share"), [(71.0, 0.25 * 43.0 / 71.0 + 0.04), (200.0, 0.15)])
+def test_of_a_stubby_part_as_much_is_left_bare_as_a_holder_grips(long: float, share: float) -> None:
+    mesh, _ = part_of(drum(21.5, long))
+    whole = Target({"surface": ["all"]}, np.ones(len(mesh.triangles), dtype=bool), "all")
+    end = held_end(mesh, whole, UPRIGHT)
+    assert end is not None
+    cut = end.target.keys["box_mm"][1][2] if end.axis[2] > 0.0 else end.target.keys["box_mm"][0][2]
+    left = long - cut if end.axis[2] > 0.0 else cut
+    assert left / long == pytest.approx(share, abs=1e-3)
 
 
 def of_area(mesh: PartMesh, target: np.ndarray, box: list[list[float]] | None) -> float:
