@@ -79,12 +79,17 @@ def depth_below(
 
 
 def bare_behind(
-    vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray, thickest: float
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    chosen: np.ndarray,
+    peened: np.ndarray,
+    thickest: float,
 ) -> float:
-    """Return the share of a chosen area with a thinner part under it and nothing chosen behind it.
+    """Return the share of a chosen area with a thinner part under it and nothing peened behind it.
 
     Args:
         vertices, triangles, chosen: those of depth_below.
+        peened: marks the triangles that are peened, chosen or not, (m,).
         thickest: thickness [m] below which the part is thin.
     """
     samples = measure_depth(vertices, triangles, 0.2 * thickest, thickest)
@@ -96,7 +101,7 @@ def bare_behind(
     behind = samples.place[thin] - samples.thickness[thin, None] * normal
     length = max(thickest, 2.0 * samples.spacing)
     beyond = _nearest(samples, behind, -normal, length)
-    return float((~chosen[samples.triangle[beyond]]).sum() / own.sum())
+    return float((~peened[samples.triangle[beyond]]).sum() / own.sum())
 
 
 def only_plates(samples: Samples) -> Samples:

@@ -254,4 +254,4 @@ def _panels(
         )
         for number, (one, own, of_pose) in enumerate(poses, start=2)
     ]
-    return [whole._replace(caption="in the chamber, pose 1"), *others, of_target[0]]
+    return [whole._replace(caption="in the chamber, pose 1"), *others, *of_target[:1]]

@@ -7,6 +7,7 @@ nothing lies over the part, and the size of texts does not depend on the picture
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import zip_longest
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -91,14 +92,15 @@ def write_page(
 
     Args:
         picture: .png file to write.
-        rows: rows of views, each with the same number of views.
+        rows: rows of views; one may have fewer views than another.
         legend: colours and their meaning.
         bar: colour bar beside the views.
         remarks: sentences below the views.
     """
     images = [[one.view.image.shape for one in row.panels] for row in rows]
     heights = [max(one[0] for one in row) + FOOT for row in images]
-    widths = [max(row[k][1] for row in images) for k in range(len(images[0]))]
+    columns = zip_longest(*images, fillvalue=(0, 0))
+    widths = [max(one[1] for one in column) for column in columns]
     left = EDGE + np.cumsum([0, *(one + BETWEEN for one in widths)])
     across = float(left[-1] + (BAR if bar else 0.0))
     titles = [_wrapped(row.title, across, TITLE) for row in rows]

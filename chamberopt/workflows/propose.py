@@ -199,7 +199,10 @@ def _written(first: Proposal, pilots: _Pilots, folder: Path) -> Proposed:
     made = pilots.improve(first) if pilots.wishes.pilot else first
     pilots.begin(WRITING)
     if made.chamber is not first.chamber:
-        draw_target(made.design, made.chamber, folder / PICTURE)  # in the place of the first one
+        (folder / PICTURE).unlink(missing_ok=True)  # of the first proposal
+        told = draw_target(made.design, made.chamber, folder / PICTURE)
+        if not (folder / PICTURE).is_file():
+            teller.tell(told)
     left_out = find_left_out(made)
     write_text(folder / DESIGN, design_text(made, folder, left_out))
     studies = study_texts(made, DESIGN)

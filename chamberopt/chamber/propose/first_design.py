@@ -298,7 +298,7 @@ def _proposed(
     bores = find_bores(mesh, target.triangles)
     may_turn = wanted.may_turn and wanted.pose is None
     turning = turning_bore(bores, mesh, target.triangles) if may_turn else None
-    is_whole = turning is None and (end is None or end.settings == 1)
+    is_whole = turning is None and (end is None or end.strips is None)
     if is_whole and not _can_be_mounted(shape, turns, diameter, wanted, out):
         poses = {turns: pose_reason}
         for one in AT_SIDE if wanted.pose is None else ():
@@ -350,7 +350,7 @@ def _proposed(
             progress(number, len(WIDER), None)
             try:
                 placed, floor = _place(shape, pose, diameter, form, wider, is_local, out)
-                floor = floor._replace(settings=end.settings if end is not None else 1)
+                floor = floor._replace(strips=end.strips if end is not None else None)
                 part = {**tables["part"], "rotate_deg": list(placed)}
                 if any(floor.offset_mm):
                     part["offset_mm"] = list(floor.offset_mm)

@@ -14,6 +14,7 @@ from chamberopt.chamber.checks.check import shot_reach, touched, warnings
 from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
 from chamberopt.chamber.propose.pose import Pose
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS, SizeFit, charge_of
+from chamberopt.chamber.propose.proposed_end import Strips
 from chamberopt.chamber.propose.proposed_floor import Floor
 from chamberopt.chamber.propose.proposed_target import Sizes, Surface
 from chamberopt.chamber.propose.shop import Shop, ShopSonotrode
@@ -110,7 +111,7 @@ class Proposal:
     warnings: tuple[str, ...]
     jams: tuple[JamGap, ...]  # gaps of chamber and part in which the balls jam
     sonotrode: ShopSonotrode  # whose face carries the chamber
-    settings: int = 1  # as of the floor
+    strips: Strips | None = None  # of which the target is one
     # Of all replicas of a candidate [s], to know the time in which its target is covered; None if
     # no pilot ran, or balls do not touch enough of the target.
     search_time: float | None = None
@@ -119,6 +120,11 @@ class Proposal:
     predicted: PredictedIntensity | None = None  # by that pilot
     # Balls of several sizes that pilots compared, the smallest first; none without a pilot.
     trials: tuple[BallTrial, ...] = ()
+
+    @property
+    def settings(self) -> int:
+        """In how many settings of the part all of the target is peened, one after the other."""
+        return 1 if self.strips is None else self.strips.settings
 
     @property
     def sonotrode_count(self) -> int:
@@ -176,7 +182,7 @@ def checked(
         warnings=found,
         jams=tuple(jam_gaps(chamber, diameter, gaps_in_reach(shot_reach(design, chamber)))),
         sonotrode=floor.stand.sonotrode,
-        settings=floor.settings,
+        strips=floor.strips,
     )
 
 

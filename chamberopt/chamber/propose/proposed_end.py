@@ -63,6 +63,31 @@ FACING, CLOSES, BEFORE, BEHIND = 0.999, 0.5, 1e-5, 0.2e-3
 NEAREST, INTO = 0.25, 0.5e-3
 
 
+class Strips(NamedTuple):
+    """Equal strips of a target across an axis of the part's file, each peened in its own setting.
+
+    Attributes:
+        axis: number of the axis.
+        low: where the first one begins [m].
+        pitch: length of each [m].
+        settings: number of them.
+        chosen: number of the proposed one, from 0.
+    """
+
+    axis: int
+    low: float
+    pitch: float
+    settings: int
+    chosen: int
+
+    def box_mm(self, mesh: PartMesh, number: int) -> list[list[float]]:
+        """Return the box [mm], as designs have it, round one of them."""
+        low, high = (1e3 * (self.low + k * self.pitch) for k in (number, number + 1))
+        corners = box_beyond(mesh, self.axis, True, low)
+        corners[1][self.axis] = round(high, 3)
+        return corners
+
+
 class HeldEnd(NamedTuple):
     """An end of a part that is left out of its target, and a pose in which the part is held by it.
 
@@ -76,7 +101,7 @@ class HeldEnd(NamedTuple):
     at: dict[str, Any]  # keys that choose the end
     triangles: np.ndarray  # marks those of the end, (m,)
     goes_out: bool = False
-    settings: int = 1  # in which all of the target is peened, a strip of it in each
+    strips: Strips | None = None  # in which the target is peened, if this is one of them
 
 
 class Shape(NamedTuple):
@@ -139,8 +164,10 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
         return None
     box = box_beyond(mesh, axis, not is_top, cut)
     keys = {**target.keys, "box_mm": box, "cut": True}
+    bare = float(area[of_end & target.triangles].sum() / area[target.triangles].sum())
     reason = (
-        f"{target.reason}; AN END IS LEFT BARE, {share:.0%} of its length, to hold it by, in a "
+        f"{target.reason}; AN END IS LEFT BARE, {share:.0%} of its length, {bare:.0%} of the "
+        "target, to hold it by, in a "
         "soft lining where it is a finished seat: accept it, or peen it in a second setup, end for "
         "end"
     )
@@ -191,14 +218,10 @@ def strip(mesh: PartMesh, target: Target, turns: Turns, longest: float) -> HeldE
     if count < 2 or not is_level or "box_mm" in target.keys:
         return None
     pitch = extent / count
-
-    def box(number: int) -> list[list[float]]:
-        corners = np.array(box_beyond(mesh, axis, True, 1e3 * (low + number * pitch)))
-        corners[1, axis] = round(1e3 * (low + (number + 1) * pitch), 3)
-        return [[float(x) for x in corner] for corner in corners]
+    strips = Strips(axis, low, pitch, count, 0)
 
     def area_in(number: int) -> float:
-        cut = cut_shape(mesh, target.triangles, box(number))
+        cut = cut_shape(mesh, target.triangles, strips.box_mm(mesh, number))
         return float(areas(cut.vertices, cut.triangles)[cut.target].sum())
 
     each = [area_in(k) for k in range(count)]
@@ -215,9 +238,10 @@ def strip(mesh: PartMesh, target: Target, turns: Turns, longest: float) -> HeldE
         f"{over}, and each takes the treatment time; where the part ends, a plate closes the "
         "chamber"
     )
-    keys = {**target.keys, "box_mm": box(chosen), "cut": True}
+    keys = {**target.keys, "box_mm": strips.box_mm(mesh, chosen), "cut": True}
     of_strip = Target(keys, target.triangles & inside, reason)
-    return HeldEnd(of_strip, turns, np.eye(3)[axis], {}, ~inside, True, count)
+    strips = strips._replace(chosen=chosen)
+    return HeldEnd(of_strip, turns, np.eye(3)[axis], {}, ~inside, True, strips)
 
 
 def cut_shape(mesh: PartMesh, target: np.ndarray, box_mm: list[list[float]] | None) -> Shape:

@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.propose.proposed_end import Strips
 from chamberopt.chamber.propose.proposed_target import Sizes
 from chamberopt.chamber.propose.shop import Shop, Stand
 from chamberopt.common.errors import InputError
@@ -66,7 +67,7 @@ class Floor(NamedTuple):
     is_raised: bool = (
         False  # whether the part is higher to stay clear of the face outside the walls
     )
-    settings: int = 1  # of the part, one after the other, in which all of the target is peened
+    strips: Strips | None = None  # of the target, if one is peened after the other
 
     @property
     def is_one_sonotrode(self) -> bool:

@@ -440,11 +440,10 @@ def _needed(made: Proposal, off: float) -> str:
     now = setting_of(made)
     amplitude = now.amplitude_um * math.exp(-off / AMPLITUDE_POWER)
     ball = now.ball_mm * math.exp(-off / BALL_POWER)
-    allowed = "larger than" if off < 0.0 else "smaller than"
+    too_large = ", larger than the target's fillets and slots allow by rule" if off < 0.0 else ""
     return (
         f"it takes an amplitude of about {plain(amplitude, 2)} µm zero-to-peak, or balls of about "
-        f"{plain(ball, 2)} mm, {allowed} the target's fillets and slots allow by rule (--ball-mm "
-        "takes others)"
+        f"{plain(ball, 2)} mm{too_large} (--ball-mm takes others)"
     )
 
 

@@ -13,12 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.chamber.build import Chamber
+from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.checks.check import touched
 from chamberopt.chamber.checks.openings import Opening, find_openings
 from chamberopt.chamber.part import chosen_on_part, chosen_triangles
 from chamberopt.chamber.propose.pose import Turns
 from chamberopt.chamber.propose.proposal import Proposal, touched_share
 from chamberopt.chamber.propose.proposed_arbor import Bore
+from chamberopt.chamber.propose.proposed_end import Strips
 from chamberopt.chamber.propose.proposed_target import (
     RUNNING,
     Surface,
@@ -26,6 +28,7 @@ from chamberopt.chamber.propose.proposed_target import (
     area_in_mm2,
     named_or_all,
 )
+from chamberopt.common.errors import InputError, one_line
 from chamberopt.design.design import Design
 from chamberopt.design.intensity import THIN_MM
 from chamberopt.design.part import Selection
@@ -186,7 +189,8 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     posed = proposal.chamber.part
     if (sharp := sharp_edges(posed.vertices, posed.triangles, posed.target)) > LEAST_EDGES:
         found.append(LeftOut({}, f"SHARP EDGES, {1e3 * sharp:.0f} mm of the target's{EDGES}"))
-    bare = bare_behind(posed.vertices, posed.triangles, posed.target, 1e-3 * THIN_MM)
+    met = posed.target | (touched(proposal.design, proposal.chamber) > 0.5)
+    bare = bare_behind(posed.vertices, posed.triangles, posed.target, met, 1e-3 * THIN_MM)
     if bare > ONE_SIDED:
         found.append(
             LeftOut(
@@ -198,11 +202,49 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
         )
     if text := moved_openings(proposal.chamber):
         found.append(LeftOut({}, text))
+    if proposal.strips and (text := unlike_settings(proposal, proposal.strips)):
+        found.append(LeftOut({}, text))
     beside = [one for one in proposal.known if not np.any(one.triangles & target)]
     names = {one.name for one in [*beside, *_bodies_of(proposal, target, beside)]}
     others = [one for one in proposal.known if one.name in names]
     found += _met_beside(proposal, others[:MOST_LOOKED_AT], float(area[target].sum()))
     return found
+
+
+def unlike_settings(proposal: Proposal, strips: Strips) -> str:
+    """Return in words in which settings the proposed chamber cannot be built; "" if in all.
+
+    In each the part is moved so that another strip of the target is where the proposed one is.
+    """
+    design, why = proposal.design, {}
+    for number in range(strips.settings):
+        by_mm = 1e3 * (strips.chosen - number) * strips.pitch
+        moved: dict[str, Any] = {"part.target.box_mm": strips.box_mm(proposal.mesh, number)}
+        places = {"part": design.part.model_dump(mode="json")}
+        steps = enumerate(design.steps or ())
+        places |= {f"steps.{k}.part": one.part for k, one in steps if one.part}
+        for name, part in places.items():
+            if "offset_mm" in part:
+                moved[f"{name}.offset_mm.0"] = part["offset_mm"][0] + by_mm
+        try:
+            heights = _heights(build_chamber(design.changed(moved)))
+        except InputError as error:
+            why[number + 1] = one_line(str(error)).partition(";")[0]
+            continue
+        if np.abs(heights - _heights(proposal.chamber)).max() > 1e-3 * MOVED_MM:
+            why[number + 1] = "what of the part is within the walls there hangs lower"
+    if not why:
+        return ""
+    return (
+        f"SETTINGS {', '.join(map(str, why))} of {strips.settings} need a chamber of their own: "
+        f"{'; '.join(dict.fromkeys(why.values()))}"
+    )
+
+
+def _heights(chamber: Chamber) -> np.ndarray:
+    """Return the height of the part's lowest point in each step over the sonotrode [m]."""
+    rooms = chamber.steps or (chamber,)
+    return np.array([one.part.vertices[:, 2].min() for one in rooms])
 
 
 def _moved_mm(one: Opening, other: Opening) -> float:

@@ -132,5 +132,7 @@ def test_a_sheet_of_which_one_side_is_chosen_is_bare_behind(thick_mm: float, sha
     sheet = trimesh.creation.box((0.06, 0.06, 1e-3 * thick_mm))
     up = sheet.face_normals[:, 2]
     for chosen, wanted in ((up > 0.5, share), (np.abs(up) > 0.5, 0.0), (np.abs(up) < 0.5, 0.0)):
-        found = bare_behind(sheet.vertices, sheet.faces, chosen, 2.3e-3)
+        found = bare_behind(sheet.vertices, sheet.faces, chosen, chosen, 2.3e-3)
         assert found == pytest.approx(wanted, abs=0.05)
+        everywhere = np.ones(len(sheet.faces), dtype=bool)  # peened beside what is chosen
+        assert bare_behind(sheet.vertices, sheet.faces, chosen, everywhere, 2.3e-3) == 0.0

@@ -212,13 +212,16 @@ def test_strips_of_a_target_are_equal_however_it_is_divided(
     sides = np.abs(body.face_normals[:, 1]) > 0.9
     one = strip(mesh, Target({"faces": []}, sides, "sides"), UPRIGHT, 1e-3 * longest)
     assert one is not None
-    assert one.settings == count
+    assert one.strips is not None
+    assert one.strips.settings == count
     assert np.abs(one.axis).argmax() == 0
     box = one.target.keys["box_mm"]
     assert box[1][0] - box[0][0] == pytest.approx(400.0 / count, abs=2e-3)
     assert of_area(mesh, sides, None) == pytest.approx(2 * 400.0 * 20.0)
     assert of_area(mesh, sides, box) == pytest.approx(2 * 400.0 * 20.0 / count, rel=1e-4)
     assert f"in {count} settings" in one.target.reason
+    each = [of_area(mesh, sides, one.strips.box_mm(mesh, k)) for k in range(count)]
+    assert sum(each) == pytest.approx(2 * 400.0 * 20.0, rel=1e-4)
 
 
 def test_a_target_without_a_level_long_axis_or_that_fits_has_no_strip() -> None:
