@@ -76,6 +76,7 @@ async function drawChamber(isDraft) {
   if (isFirst) find("made").scrollIntoView({ behavior: "smooth" });
   const answer = unpack(await ask("/chamber", {}));
   if (!seen || answer.state.length !== seen.triangles.length / 3) return; // of another part
+  view.highlight("part", null); // the target has its own colour
   view.pose("part", answer.rotation, answer.shift);
   colourByState(view, "part", seen, answer.state);
   view.surface("walls", { points: answer.points, triangles: answer.walls, kind: "wall" });
