@@ -51,6 +51,7 @@ async function draw(part) {
   if (drawn === drawnPart && !view.get("walls")) return;
   view.highlight("part", null);
   for (const name of ["part", ...CHAMBER]) view.remove(name);
+  tools.renew();
   drawnPart = drawn;
   if (!part) return;
   const told = unpack(await ask("/view", { part, unit: known.unit }));
@@ -76,6 +77,7 @@ async function drawChamber(isDraft) {
   if (isFirst) find("made").scrollIntoView({ behavior: "smooth" });
   const answer = unpack(await ask("/chamber", {}));
   if (!seen || answer.state.length !== seen.triangles.length / 3) return; // of another part
+  tools.renew();
   view.highlight("part", null); // the target has its own colour
   view.pose("part", answer.rotation, answer.shift);
   colourByState(view, "part", seen, answer.state);

@@ -18,6 +18,7 @@ export function showPart(buffer) {
 
 // What `shape` answers: at once, without the part taken out.
 export function showShape(answer) {
+  tools.renew();
   view.pose("part", answer.rotation, answer.shift);
   view.get("part").visible = true;
   for (const name of ["remeshed", ...BODIES]) view.remove(name); // until the cavity is cut anew
