@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, get_args
@@ -188,12 +188,16 @@ class Front:
             "pose": (asked["pose"], get_args(Pose)),
         }
         arguments = ["new", f"./{part.relative_to(self._folder).as_posix()}"]
-        for option, (given, allowed) in wanted.items():
-            if given and given not in allowed:
-                raise InputError(f"--{option}: given {given!r}; {_hint(given, allowed)}")
-            arguments += [f"--{option}={given}"] if given else []
+        faults = [
+            f"--{option}: given {given!r}; {_hint(given, allowed)}"
+            for option, (given, allowed) in wanted.items()
+            if given and given not in allowed
+        ]
+        arguments += [f"--{option}={given}" for option, (given, _) in wanted.items() if given]
         wishes = {name: str(asked[name]).strip() for name in ("intensity", "coverage", "ball-mm")}
-        _require_possible(wishes, str(asked["material"]), bool(asked["pilot"]))
+        faults += _faults(wishes, str(asked["material"]), bool(asked["pilot"]))
+        if faults:
+            raise InputError("\n".join(faults))
         arguments += [f"--{name}={text}" for name, text in wishes.items() if text]
         arguments += [f"--target={name}" for name in map(str, asked["target"])]
         for option in ("shop", "calibration"):
@@ -256,16 +260,20 @@ def _hint(given: str, allowed: Sequence[str]) -> str:
     return f"did you mean {found[0]!r}?" if found else "choose one that the field lists"
 
 
-def _require_possible(wishes: Mapping[str, str], alloy: str, pilot: bool) -> None:
-    """Raise InputError, in the words of `new`, for wishes that it would refuse."""
-    numbers: dict[str, float | None] = {}
-    for name in ("coverage", "ball-mm"):
+def _faults(wishes: Mapping[str, str], alloy: str, pilot: bool) -> Iterator[str]:
+    """Yield why `new` would refuse each of some wishes, in its words."""
+    for name, text in wishes.items():
+        if not text:
+            continue
         try:
-            numbers[name] = float(wishes[name]) if wishes[name] else None
+            coverage = float(text) if name == "coverage" else None
+            ball_mm = float(text) if name == "ball-mm" else None
+            wanted = Wanted(alloy=alloy, ball_mm=ball_mm, coverage=coverage)
+            Wishes(wanted, text if name == "intensity" else None, pilot).require_possible()
         except ValueError:
-            raise InputError(f"--{name}: given {wishes[name]!r}; give a number") from None
-    wanted = Wanted(alloy=alloy, ball_mm=numbers["ball-mm"], coverage=numbers["coverage"])
-    Wishes(wanted, wishes["intensity"] or None, pilot).require_possible()
+            yield f"--{name}: given {text!r}; give a number"
+        except InputError as error:
+            yield str(error)
 
 
 def _plain_files(folder: Path) -> list[Path]:

@@ -117,11 +117,11 @@ def on_page(text: str, known: set[str] | None = None) -> Words:
     return [*made, *[text[at:]] * (at < len(text))]
 
 
-_LINE = re.compile(r"(?m)^(?:.*\.toml:\d+: )?(?:vary\.)?([a-z][\w.]*): (.+)$")
+_LINE = re.compile(r"(?m)^(?:.*\.toml:\d+: )?(?:vary\.|--)?([a-z][\w.-]*): (.+)$")
 
 
 def at_keys(text: str) -> dict[str, Words]:
-    """Return what a message says of each key with which one of its lines begins.
+    """Return what a message says of each key or option with which one of its lines begins.
 
     >>> at_keys("a/design.toml:9: chamber.height_mm: given -5; allowed: from 2 mm")
     {'chamber.height_mm': ['given -5; allowed: from 2 mm']}

@@ -84,7 +84,7 @@ function showLimits() {
     side.addEventListener("change", () => { one.side = side.value; });
     box.addEventListener("change", () => { one.value = box.value; });
     const out = element("button", { type: "button", textContent: "✕", title: "leave this limit out" });
-    out.addEventListener("click", () => { limits = limits.filter((other) => other !== one); showLimits(); });
+    out.addEventListener("click", () => { limits = limits.filter((other) => other !== one); showLimits(); unsay(); });
     return element("li", {}, figure, side, box, out);
   }));
 }
@@ -99,6 +99,7 @@ function showVaried() {
   const items = [...varied].map((name) => {
     const { in_full } = state.fields.find((one) => one.name === name);
     const [low, high] = ends.get(name).map((value, k) => element("input", { type: "number", step: "any", value, ariaLabel: `${in_full}, ${["least", "largest"][k]}` }));
+    for (const end of [low, high]) end.addEventListener("input", () => end.closest("li").querySelector(".wrong")?.remove());
     for (const end of [low, high]) end.addEventListener("change", () => {
       const why = bound(name, [Number(low.value), Number(high.value)]);
       putBack = why ? [name, why] : [];
@@ -185,6 +186,9 @@ find("more-of").addEventListener("click", () => attempt(async () => {
   await followToEnd(started);
 }, find("run-fault")));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
+// What was refused is no longer said once something else is asked.
+const unsay = () => { find("run-fault").textContent = find("search-fault").textContent = ""; };
+find("run").addEventListener("input", unsay);
 // Write the study of the sliders, and run it.
 find("search-sliders").addEventListener("click", () => attempt(async () => {
   const vary = Object.fromEntries([...varied].map((name) => [name, ends.get(name)]));

@@ -77,6 +77,38 @@ def test_a_slider_has_its_ends_again_after_undo(opened: Page) -> None:
     opened.wait("data-checked=reach")
 
 
+def test_what_was_not_taken_is_said_until_something_else_is(opened: Page) -> None:
+    page, name = opened.page, "shot.mass_g"
+    row = page.locator(".field", has=page.locator(f'[id="{name}"]'))
+    box, wrong = page.locator(f'[id="{name}"]'), row.locator(".wrong")
+    before = box.input_value()
+    opened.put(name, -3)
+    expect(page.locator("#error")).to_contain_text("given -3", timeout=WAIT)
+    box.fill("abc")
+    box.press("Tab")
+    expect(wrong.last).to_have_text("abc is no number: what was there stays.")
+    expect(box).to_have_value("-3")  # as the panel says
+    page.click("#undo")
+    expect(box).to_have_value(before)
+    expect(page.locator("#error")).to_be_hidden(timeout=WAIT)
+    expect(wrong).to_have_count(0)
+    row.hover()
+    low = row.locator(".ends input").first
+    was = low.input_value()
+    low.fill("9999")
+    low.press("Tab")
+    expect(wrong).to_contain_text("9999 is not less than")
+    low.fill(was)
+    expect(wrong).to_have_count(0)
+    opened.tab("target")
+    for crease, words in (("400", "given 400; allowed: from 0.1 to 180°"), ("30", "")):
+        page.locator("#crease").evaluate("(one, text) => { one.value = text; }", crease)
+        page.locator("#crease").dispatch_event("input")
+        expect(page.locator("#crease-fault")).to_have_text(words)
+    opened.tab("numbers")
+    opened.wait("data-checked=reach")
+
+
 def test_a_young_run_tells_the_time_that_is_left(opened: Page) -> None:
     """Of 24 replicas 0.2 are done in 8 s, after nothing in 9 s; then half an evaluation in 6 s.
 
@@ -557,6 +589,9 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     page.click("#search-sliders")
     expect(page.locator("#search-fault")).to_contain_text("design.toml")
     expect(page.locator("#search-fault")).to_be_in_viewport()
+    page.fill("#evaluations", "3")
+    expect(page.locator("#search-fault")).to_be_empty()  # of another question
+    page.fill("#evaluations", "2")
     page.fill("#study-name", "stopped")
     page.click("#search-sliders")
     expect(page.locator("#message")).to_contain_text("written: stopped.toml")
