@@ -33,13 +33,13 @@ const label = (field) => element("label", { title: `${field.name} in the file`, 
   element("b", { textContent: field.label }), " ", ...onPage(field.text),
   ...(field.reason.length ? [element("small", {}, element("span", { className: "changed-by" }), element("span", { className: "reason" }, ...onPage(field.reason)))] : []));
 
-// The reason of a number is that of the number in the file, and is struck where that was changed.
+// The reason of a number is that of the number in the file, and is dim where that was changed: it may say what the number is, too.
 function showReason(row, field, now) {
   const [changed, reason] = [".changed-by", ".reason"].map((name) => row.querySelector(name)), was = original(field.name);
   if (!reason || reason.textContent.startsWith("changed by you")) return;
   const isChanged = now !== was;
   changed.textContent = isChanged ? `changed by you; ${state.file.is_proposed ? "proposed was" : "in the file it is"} ${was ?? "none"}. ` : "";
-  reason.classList.toggle("struck", isChanged);
+  reason.classList.toggle("past", isChanged);
 }
 
 function choiceRow(field) {

@@ -100,7 +100,7 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             expect(label).to_contain_text("Height")
             expect(label).to_contain_text("sonotrode to ceiling")  # the reason of its number
             opened.put("chamber.height_mm", 77)
-            proposed = page.locator('label[for="chamber.height_mm"] .struck')
+            proposed = page.locator('label[for="chamber.height_mm"] .past')
             expect(proposed).to_contain_text("sonotrode to ceiling")  # which is of another number
             expect(label).to_contain_text("changed by you; proposed was ")
             page.click("#undo")
