@@ -1,5 +1,5 @@
 // The view: part and chamber as the newest answers have them, and handles that turn and move the part.
-import { change, endMove, unpack, value } from "./state.js";
+import { change, endMove, state, unpack, value } from "./state.js";
 import { colourByState } from "./surfaces.js";
 
 const BODIES = ["deflectors", "holder", "mask"]; // that not every chamber has
@@ -27,6 +27,7 @@ export function showShape(answer) {
   const first = !placed;
   placed = answer;
   if (first) lookAtAll();
+  else if (state.showing && isBeyond(answer.shape_mm)) lookAtAll(view.camera.position.clone().sub(view.orbit.target).normalize().toArray());
   dimensions();
   if (grip && !handles.dragging) grip.position.set(...middle());
 }
@@ -77,12 +78,15 @@ const mid = (a, b) => a.map((x, i) => 0.5 * (x + b[i]));
 const middle = () => mid(...placed.part_mm);
 const short = (x) => String(Number(x.toPrecision(4)));
 
-function lookAtAll() {
+let fitted = null; // lowest and highest corner of what was last looked at as a whole
+const isBeyond = ([low, high]) => low.some((x, i) => x < fitted[0][i] - 0.1) || high.some((x, i) => x > fitted[1][i] + 0.1);
+function lookAtAll(way = placed.way) {
   // A part that goes far out of its chamber is not seen to its end.
   const [inner, outer] = placed.shape_mm, room = 0.4 * Math.hypot(...outer.map((x, i) => x - inner[i]));
   const low = inner.map((x, i) => Math.min(x, Math.max(x - room, placed.part_mm[0][i])));
   const high = outer.map((x, i) => Math.max(x, Math.min(x + room, placed.part_mm[1][i])));
-  const size = Math.hypot(...high.map((x, i) => x - low[i])), centre = mid(low, high), { way } = placed;
+  const size = Math.hypot(...high.map((x, i) => x - low[i])), centre = mid(low, high);
+  fitted = [low, high];
   view.look({ middle: centre, eye: centre.map((x, i) => x + 2.6 * size * way[i]), size });
 }
 
