@@ -55,6 +55,7 @@ class Front:
     def __init__(self, folder: Path, file: Path | None, trusted: bool) -> None:
         self._folder, self._trusted = folder.resolve(), trusted
         self.command = OneCommand()
+        self._asked: dict[str, str] = {}  # part and unit of the proposal that was begun last
         self._first = file.name if file is not None and is_mesh_name(file.name) else ""
         self.acts = None if file is None or self._first else Acts(file, trusted, self.command)
 
@@ -70,8 +71,8 @@ class Front:
     def status(self, _: object) -> dict[str, object]:
         """Return what the pages show of the command.
 
-        Of one that proposes a chamber it is also the picture that there is by now, and the proposal
-        in the words of the page: before the pilots have ended a draft.
+        Of one that proposes a chamber it is also the part with its unit, the picture that there is
+        by now, and the proposal in the words of the page: before the pilots have ended a draft.
         """
         now = self.command.status()
         if not str(now.get("command", "")).startswith(PROPOSING):
@@ -79,7 +80,8 @@ class Front:
         picture = self._folder / str(now["result"]) / PICTURE
         with suppress(OSError):  # there is none yet
             now["picture"] = f"{now['result']}/{PICTURE}", picture.stat().st_mtime
-        return now | {"proposal": _on_page(now["answer"] or now.pop("draft"))}
+        proposal = _on_page(now["answer"] or now.pop("draft"))
+        return now | {"proposal": proposal, "asked": self._asked}
 
     def chamber(self, _: object) -> bytes:
         """Return the shape of the chamber that is proposed, of the draft until there is a design.
@@ -206,7 +208,9 @@ class Front:
                 arguments += [f"--{option}=./{file.relative_to(self._folder).as_posix()}"]
         arguments += [] if asked["pilot"] else ["--no-pilot"]
         out = free_folder(self._folder, Path(part.stem))
-        return self.command.start([*arguments, JSON, f"--out={out}"], self._folder, out)
+        started = self.command.start([*arguments, JSON, f"--out={out}"], self._folder, out)
+        self._asked = {"part": part.name, "unit": str(asked["unit"])}
+        return started
 
     def open(self, asked: Any) -> dict[str, object]:
         """Show the page of a design from now on."""

@@ -274,8 +274,10 @@ async function follow(begun) {
 
 find("propose").addEventListener("click", () => attempt(() => propose(ticked().filter((one) => one.checked).map((one) => one.value))));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
-attempt(async () => look(await show())).then(() => { document.body.dataset.ready = "yes"; });
-attempt(async () => { // of before a reload, or before a design was opened
-  const now = await ask("/status");
-  if (now.command?.startsWith("chamberopt new ")) await follow(now);
+attempt(async () => {
+  const now = await ask("/status"), { part, unit } = now.asked ?? {}; // of before a reload, or before a design was opened
+  const chosen = await show(part);
+  await attempt(() => look(chosen, unit));
+  document.body.dataset.ready = "yes";
+  if (now.asked) await follow(now);
 });

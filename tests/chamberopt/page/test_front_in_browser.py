@@ -92,8 +92,9 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             expect(page.locator("#view")).not_to_have_attribute("data-highlight", "12")
             assert page.evaluate(MARKED_BEFORE_POSED) == [0, -1, 5]
             page.reload()
-            opened.wait('data-ended="0"')
+            opened.wait("data-chamber=proposal")  # round the part, in the unit that was chosen
             expect(page.locator("#sentence")).to_contain_text("my part.stl")
+            assert page.locator("#part").input_value() == "my part.stl"
             page.click("#open-made")
             opened.wait("data-checked=reach")
             label = page.locator('label[for="chamber.height_mm"]')
