@@ -113,12 +113,6 @@ function showVaried() {
 }
 document.addEventListener("varied", showVaried);
 
-// Start a command, follow it to its end, and give its exit status, and the folder of its result.
-export async function start(command, of) {
-  const started = await ask("/start", { command, of, points: find("points").value });
-  return { exit: await follow(started), result: started.result };
-}
-
 // Follow a command to its end, and tell what it has left.
 export async function followToEnd(started) {
   const exit = await follow(started);
@@ -126,9 +120,6 @@ export async function followToEnd(started) {
   tell("ended", exit === 0 ? started.result : "");
 }
 const tell = (name, detail) => document.dispatchEvent(new CustomEvent(name, { detail }));
-
-// Whether a command runs: a second one has to wait for its end.
-export const isBusy = () => isRunning;
 
 // Folder of the study that runs now, or "".
 export const running = () => study;
@@ -143,9 +134,7 @@ function show({ command, result, steps, seconds, printed, exit }) {
   study = exit === null && isStudy(command) ? result : "";
   if (study && study !== before) tell("study", study);
   find("stop").disabled = exit !== null;
-  const wasRunning = isRunning;
   isRunning = exit === null;
-  if (isRunning !== wasRunning) tell("running", isRunning);
   allow();
   const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
   find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...toResult(command, result, exit));

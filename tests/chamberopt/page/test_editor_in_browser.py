@@ -599,7 +599,6 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     expect(page.locator("#study-progress")).to_contain_text("at work for")
     opened.tab("results")
     expect(page.locator("#study-view")).to_be_hidden()
-    expect(page.locator("#make-later")).to_be_visible()
     opened.tab("run")
     expect(page.locator("#study-view")).to_be_visible()
     page.click("#study-stop")
@@ -660,7 +659,6 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     inner = bar["y"] + page.evaluate("document.getElementById('shown').clientTop")
     assert button["y"] + button["height"] <= inner  # nothing is below it
     row.get_by_text("make the report").click()
-    expect(page.locator("#make-later")).to_be_visible()
     expect(row.get_by_text("make the process sheet")).to_be_disabled()
     with page.expect_popup(timeout=WAIT) as report:
         page.locator("#message").get_by_text("open it").click(timeout=WAIT)

@@ -6,6 +6,7 @@ import select
 import signal
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -93,6 +94,7 @@ def test_a_report_cannot_use_the_server(served: Served) -> None:
     [
         ("/start", {"command": "simulate", "of": "../design.toml"}, "outside the folder"),
         ("/start", {"command": "new", "of": "design.toml"}, "not a command of this page"),
+        ("/make", {"paper": "report", "of": "../other"}, "outside the folder"),
         ("/shown", {"folders": ["/etc"]}, "outside the folder"),
         ("/shown", {"folders": ["."]}, "result.json"),
         ("/study", {"name": "../s.toml", "vary": {}, "evaluations": 3}, "give a name"),
@@ -172,6 +174,21 @@ def test_a_study_is_asked_with_limits_in_the_units_of_the_page(served: Served) -
     )
     assert served.ask("/duration", {"of": "limited.toml"})["searched"] == ""
     (served.folder / "limited.toml").unlink()
+
+
+def test_a_report_is_begun_beside_a_command(served: Served) -> None:
+    started = served.ask("/start", {"command": "simulate", "of": "design.toml"})
+    assert started["exit"] is None
+    now = served.ask("/make", {"paper": "sheet", "of": "results/none"})
+    assert now["command"] == "chamberopt report ./results/none --sheet"
+    while now["exit"] is None:
+        time.sleep(0.1)
+        now = served.ask("/made", {})
+    assert now["exit"] == 2  # there is no such result
+    assert "results/none" in "".join(map(str, now["fault"]))
+    served.ask("/stop", {})
+    while json.loads(served.get("/status").read())["exit"] is None:
+        time.sleep(0.1)
 
 
 @pytest.mark.parametrize(
