@@ -67,6 +67,28 @@ def test_a_number_changes_the_shape_the_facts_and_one_line(opened: Page) -> None
     assert said == [one.text for one in told]
 
 
+def test_what_is_drawn_stays_where_no_form_has_changed(opened: Page) -> None:
+    page, held = opened.page, []
+    drawn = """async () => {
+      const { view } = await import("/browser/scene.js");
+      return view.get("walls").uuid;
+    }"""
+    opened.wait("data-checked=reach")
+    page.route("**/cavity", lambda route: held.append(route))
+    for name, value, is_kept in (("shot.mass_g", 4, True), ("chamber.height_mm", 31, False)):
+        before, shapes = page.evaluate(drawn), page.evaluate("document.body.dataset.shape")
+        opened.put(name, value)
+        expect(page.locator("body")).not_to_have_attribute("data-shape", shapes, timeout=WAIT)
+        assert (page.evaluate(drawn) == before) == is_kept
+        assert page.locator("#said.waiting").count() == 1
+    page.unroute("**/cavity")
+    for route in held:
+        route.continue_()
+    page.click("#undo")
+    page.click("#undo")
+    opened.wait("data-checked=reach")
+
+
 def test_a_slider_has_its_ends_again_after_undo(opened: Page) -> None:
     slider = opened.page.locator("[type=range][aria-label='chamber.height_mm']")
     before = [slider.get_attribute(end) for end in ("min", "max")]
@@ -132,11 +154,14 @@ def test_a_young_run_tells_the_time_that_is_left(opened: Page) -> None:
         ["replicas: 0 of 24"],
         ["replicas: 0 of 24, for 10 s so far"],
         ["replicas: 0 of 24, for 10 s so far"],
-        ["replicas: 0 of 24, roughly 16 min left"],
+        ["replicas: 0 of 24, roughly 16 min left of this step"],
         ["drawing"],
         ["evaluations: 0 of 10", "replicas: 0 of 24"],
         ["evaluations: 0 of 10", "replicas: 6 of 24"],
-        ["evaluations: 0 of 10, roughly 4 min left", "replicas: 12 of 24, about 10 s left"],
+        [
+            "evaluations: 0 of 10, roughly 4 min left of this step",
+            "replicas: 12 of 24, about 10 s left of this step",
+        ],
     ]
 
 
@@ -263,13 +288,25 @@ def test_the_legend_hides_a_kind_and_the_view_turns_to_an_axis(opened: Page) -> 
         page.click("#undo")
 
 
-def test_the_wheel_zooms_only_after_a_click_or_with_ctrl(opened: Page) -> None:
+def test_the_wheel_zooms_only_after_a_click_or_with_ctrl_where_a_page_scrolls(opened: Page) -> None:
     page = opened.page
     box = page.locator("#view canvas").bounding_box()
     far = """async () => { const { view } = await import("/browser/scene.js");
         return view.camera.position.distanceTo(view.orbit.target); }"""
     place, before = (box["x"] + 30, box["y"] + 400), page.evaluate(far)
     page.click("h1, header", position={"x": 2, "y": 2})
+    page.mouse.move(*place)
+    page.mouse.wheel(0, -200)
+    page.wait_for_timeout(200)
+    assert page.evaluate(far) < 0.99 * before  # the editor does not scroll
+    page.evaluate(
+        """() => {
+        const long = Object.assign(document.createElement("div"), { id: "long" });
+        long.style = "position: absolute; top: 0; height: 3000px; width: 1px";
+        document.body.append(long);
+        document.body.style.overflow = "visible"; }"""
+    )
+    before = page.evaluate(far)
     for click, key in ((False, ""), (False, "Control"), (True, "")):
         if click:
             page.mouse.click(*place)
@@ -283,6 +320,7 @@ def test_the_wheel_zooms_only_after_a_click_or_with_ctrl(opened: Page) -> None:
         now = page.evaluate(far)
         assert (now < 0.99 * before) == (click or bool(key))
         before = now
+    page.evaluate("document.getElementById('long').remove(), document.body.style.overflow = ''")
     page.locator("#view").dblclick(position={"x": 30, "y": 400})
 
 
