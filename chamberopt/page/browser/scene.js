@@ -18,6 +18,7 @@ export function showPart(buffer) {
 
 // What `shape` answers: at once, without the part taken out.
 export function showShape(answer) {
+  if (placed?.form === answer.form) { placed = answer; return; } // what is drawn holds until the newest cavity is there
   tools.renew();
   view.pose("part", answer.rotation, answer.shift);
   view.get("part").visible = true;
@@ -34,12 +35,10 @@ export function showShape(answer) {
 
 // What `cavity` answers: exactly what the shot flies in.
 export function showCavity(answer) {
+  for (const name of ["remeshed", ...BODIES]) view.remove(name); // of the cavity before
   walls(answer);
-  if (answer.part_points) {
-    view.surface("remeshed", { points: answer.part_points.slice(), triangles: answer.part_triangles.slice(), open: !part.closed });
-    view.get("part").visible = false;
-    view.section.change();
-  }
+  if (answer.part_points) view.surface("remeshed", { points: answer.part_points.slice(), triangles: answer.part_triangles.slice(), open: !part.closed });
+  view.show(["part"], !answer.part_points);
   showState(answer.state);
 }
 
