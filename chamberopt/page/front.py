@@ -55,7 +55,7 @@ class Front:
     def __init__(self, folder: Path, file: Path | None, trusted: bool) -> None:
         self._folder, self._trusted = folder.resolve(), trusted
         self.command = OneCommand()
-        self._asked: dict[str, str] = {}  # part and unit of the proposal that was begun last
+        self._asked: dict[str, object] = {}  # part, unit and target of the newest proposal
         self._first = file.name if file is not None and is_mesh_name(file.name) else ""
         self.acts = None if file is None or self._first else Acts(file, trusted, self.command)
 
@@ -71,8 +71,8 @@ class Front:
     def status(self, _: object) -> dict[str, object]:
         """Return what the pages show of the command.
 
-        Of one that proposes a chamber it is also the part with its unit, the picture that there is
-        by now, and the proposal in the words of the page: before the pilots have ended a draft.
+        Of one that proposes a chamber it is also what was asked, the picture that there is by now,
+        and the proposal in the words of the page: before the pilots have ended a draft.
         """
         now = self.command.status()
         if not str(now.get("command", "")).startswith(PROPOSING):
@@ -209,7 +209,7 @@ class Front:
         arguments += [] if asked["pilot"] else ["--no-pilot"]
         out = free_folder(self._folder, Path(part.stem))
         started = self.command.start([*arguments, JSON, f"--out={out}"], self._folder, out)
-        self._asked = {"part": part.name, "unit": str(asked["unit"])}
+        self._asked = {key: asked[key] for key in ("part", "unit", "target")}
         return started
 
     def open(self, asked: Any) -> dict[str, object]:

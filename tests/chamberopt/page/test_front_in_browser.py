@@ -146,6 +146,9 @@ def test_a_proposal_takes_the_place_of_what_was_seen_of_the_part(tmp_path: Path)
             opened.wait("data-chamber=proposal")
             expect(view).not_to_have_attribute("data-highlight", re.compile(r"\d+"))
             expect(told).to_contain_text("click two points")
+            page.reload()
+            opened.wait("data-chamber=proposal")
+            expect(page.locator("#names input[value=FIR_TREE]")).to_be_checked()
             assert not opened.errors
     finally:
         served.process.kill()
