@@ -203,7 +203,8 @@ ANSWERS = "sentence", "warning"  # kinds of sentences that stand above the view 
 SIMULATED_TIME = "process.accuracy.simulated_time_s"
 MOST_FILES = 20  # versions of the design's text that are kept for the pages that read them
 STUDY_NAME = re.compile(r"\w[\w .+-]{0,100}\.toml")
-COMMANDS = ("simulate", "run", "sweep", "report", "sheet")
+COMMANDS = ("simulate", "run", "sweep")
+PAPERS = {"report": [], "sheet": ["--sheet"]}  # options of the command `report`
 
 
 class Acts:
@@ -223,9 +224,11 @@ class Acts:
         self._files: dict[str, EditedFile] = {}
         first = self._read()
         self._picker, self._checker = Picker(), Checker(first.path)
+        self._making = OneCommand()  # of a report or sheet, beside the other command
 
     def close(self) -> None:
         self._checker.stop()
+        self._making.end()
 
     def read(self, _: object) -> dict[str, object]:
         """Return the design file as it is now, for a page that is opened or reloaded."""
@@ -363,23 +366,28 @@ class Acts:
     def start(self, asked: Any) -> dict[str, object]:
         """Start a command of the command line.
 
-        The command works on the saved design, on a study beside it or on a result below its folder.
-        The answer has the folder of the result that it will leave, if any.
+        The command works on the saved design or on a study beside it. The answer has the folder of
+        the result that it will leave, if any.
         """
         command, what = str(asked["command"]), self.inside(str(asked["of"]))
         if command not in COMMANDS:
             raise InputError(f"{command}: not a command of this page: {', '.join(COMMANDS)}")
         name = f"./{what.relative_to(self._path.parent).as_posix()}"
-        if command in ("report", "sheet"):
-            arguments = ["report", name, *(["--sheet"] if command == "sheet" else [])]
-            shows = ""
-        else:
-            self._refuse_shape(what)
-            sweeps = ["--sobol", str(int(asked["points"]))] if command == "sweep" else []
-            folder = self._free_folder(f"{what.stem}-sweep" if sweeps else what.stem)
-            arguments = [command, name, *sweeps, "--out", folder]
-            shows = "" if sweeps else folder
-        return self._command.start(arguments, self._path.parent, shows)
+        self._refuse_shape(what)
+        sweeps = ["--sobol", str(int(asked["points"]))] if command == "sweep" else []
+        folder = self._free_folder(f"{what.stem}-sweep" if sweeps else what.stem)
+        arguments = [command, name, *sweeps, "--out", folder]
+        return self._command.start(arguments, self._path.parent, "" if sweeps else folder)
+
+    def make(self, asked: Any) -> dict[str, object]:
+        """Start to make the report or sheet of a result, also while another command runs."""
+        what = self.inside(str(asked["of"])).relative_to(self._path.parent).as_posix()
+        options = PAPERS[str(asked["paper"])]
+        return self._making.start(["report", f"./{what}", *options], self._path.parent)
+
+    def made(self, _: object) -> dict[str, object]:
+        """Return how far the report or process sheet is that was begun last."""
+        return self._making.status()
 
     def duration(self, asked: Any) -> dict[str, object]:
         """Return in words how long a design or study will take; "" if nothing is known of it.

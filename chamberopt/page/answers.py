@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
@@ -125,9 +126,16 @@ def shape_answer(design: Design, step: int = 0) -> bytes:
         "target_triangles": int(part.target.sum()),
         "balls": design.shot.count,
         "zones": [*part.zones],  # zone k + 1 has name k
+        "form": _form(design),
     }
     surface = _surface(shape.vertices, shape.triangles, shape.tags)
     return packed(head, **surface, state=state, zone=zone)
+
+
+def _form(design: Design) -> str:
+    """Return what is the same for designs with the same part, chamber, holder and mask."""
+    text = design.model_dump_json(include={"part", "chamber", "holder", "mask", "zones"})
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 @lru_cache(maxsize=8)

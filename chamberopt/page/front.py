@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, get_args
@@ -55,6 +55,7 @@ class Front:
     def __init__(self, folder: Path, file: Path | None, trusted: bool) -> None:
         self._folder, self._trusted = folder.resolve(), trusted
         self.command = OneCommand()
+        self._asked: dict[str, object] = {}  # part, unit and target of the newest proposal
         self._first = file.name if file is not None and is_mesh_name(file.name) else ""
         self.acts = None if file is None or self._first else Acts(file, trusted, self.command)
 
@@ -70,8 +71,8 @@ class Front:
     def status(self, _: object) -> dict[str, object]:
         """Return what the pages show of the command.
 
-        Of one that proposes a chamber it is also the picture that there is by now, and the proposal
-        in the words of the page: before the pilots have ended a draft.
+        Of one that proposes a chamber it is also what was asked, the picture that there is by now,
+        and the proposal in the words of the page: before the pilots have ended a draft.
         """
         now = self.command.status()
         if not str(now.get("command", "")).startswith(PROPOSING):
@@ -79,7 +80,8 @@ class Front:
         picture = self._folder / str(now["result"]) / PICTURE
         with suppress(OSError):  # there is none yet
             now["picture"] = f"{now['result']}/{PICTURE}", picture.stat().st_mtime
-        return now | {"proposal": _on_page(now["answer"] or now.pop("draft"))}
+        proposal = _on_page(now["answer"] or now.pop("draft"))
+        return now | {"proposal": proposal, "asked": self._asked}
 
     def chamber(self, _: object) -> bytes:
         """Return the shape of the chamber that is proposed, of the draft until there is a design.
@@ -188,12 +190,16 @@ class Front:
             "pose": (asked["pose"], get_args(Pose)),
         }
         arguments = ["new", f"./{part.relative_to(self._folder).as_posix()}"]
-        for option, (given, allowed) in wanted.items():
-            if given and given not in allowed:
-                raise InputError(f"--{option}: given {given!r}; {_hint(given, allowed)}")
-            arguments += [f"--{option}={given}"] if given else []
+        faults = [
+            f"--{option}: given {given!r}; {_hint(given, allowed)}"
+            for option, (given, allowed) in wanted.items()
+            if given and given not in allowed
+        ]
+        arguments += [f"--{option}={given}" for option, (given, _) in wanted.items() if given]
         wishes = {name: str(asked[name]).strip() for name in ("intensity", "coverage", "ball-mm")}
-        _require_possible(wishes, str(asked["material"]), bool(asked["pilot"]))
+        faults += _faults(wishes, str(asked["material"]), bool(asked["pilot"]))
+        if faults:
+            raise InputError("\n".join(faults))
         arguments += [f"--{name}={text}" for name, text in wishes.items() if text]
         arguments += [f"--target={name}" for name in map(str, asked["target"])]
         for option in ("shop", "calibration"):
@@ -202,7 +208,9 @@ class Front:
                 arguments += [f"--{option}=./{file.relative_to(self._folder).as_posix()}"]
         arguments += [] if asked["pilot"] else ["--no-pilot"]
         out = free_folder(self._folder, Path(part.stem))
-        return self.command.start([*arguments, JSON, f"--out={out}"], self._folder, out)
+        started = self.command.start([*arguments, JSON, f"--out={out}"], self._folder, out)
+        self._asked = {key: asked[key] for key in ("part", "unit", "target")}
+        return started
 
     def open(self, asked: Any) -> dict[str, object]:
         """Show the page of a design from now on."""
@@ -256,16 +264,20 @@ def _hint(given: str, allowed: Sequence[str]) -> str:
     return f"did you mean {found[0]!r}?" if found else "choose one that the field lists"
 
 
-def _require_possible(wishes: Mapping[str, str], alloy: str, pilot: bool) -> None:
-    """Raise InputError, in the words of `new`, for wishes that it would refuse."""
-    numbers: dict[str, float | None] = {}
-    for name in ("coverage", "ball-mm"):
+def _faults(wishes: Mapping[str, str], alloy: str, pilot: bool) -> Iterator[str]:
+    """Yield why `new` would refuse each of some wishes, in its words."""
+    for name, text in wishes.items():
+        if not text:
+            continue
         try:
-            numbers[name] = float(wishes[name]) if wishes[name] else None
+            coverage = float(text) if name == "coverage" else None
+            ball_mm = float(text) if name == "ball-mm" else None
+            wanted = Wanted(alloy=alloy, ball_mm=ball_mm, coverage=coverage)
+            Wishes(wanted, text if name == "intensity" else None, pilot).require_possible()
         except ValueError:
-            raise InputError(f"--{name}: given {wishes[name]!r}; give a number") from None
-    wanted = Wanted(alloy=alloy, ball_mm=numbers["ball-mm"], coverage=numbers["coverage"])
-    Wishes(wanted, wishes["intensity"] or None, pilot).require_possible()
+            yield f"--{name}: given {text!r}; give a number"
+        except InputError as error:
+            yield str(error)
 
 
 def _plain_files(folder: Path) -> list[Path]:

@@ -49,6 +49,7 @@ COMMANDS = {
     "chamberopt new": "the page of parts",
     "chamberopt shop --example": "the example of a shop's file",
     "simulate it with --tolerances": "simulate it with tolerances, in a terminal",
+    "set part.target.reachable = true": "leave out of it, in the file, what no ball can touch",
 }
 # Parts of messages that only a terminal needs: the page leaves them out.
 _TERMINAL = re.compile(
@@ -56,7 +57,10 @@ _TERMINAL = re.compile(
     "|(?<= mm from the sonotrode): chamberopt strip|(?<=more note): --verbose shows all"
     "|(?<=more notes): --verbose shows all|(?m:^to resume: .*\\n?)"
     "|; to resume it: .*|; --tolerances simulates them too"
+    r"| \(docs/[\w/]+\.md(?:#[\w-]+)?\)|(?:, or|;) use --at ZONE(?: with a zone of the part)?"
 )
+# Sizes of strips, as options of a command.
+_DISC, _STRIP = re.compile(r"--disc-mm ([\d.]+)"), re.compile(r"--size-mm ([\d.]+) ([\d.]+)")
 # Terms that not every reader knows, and what they mean (docs/reference/glossary.md).
 TERMS = {
     "uniform coverage": "mean coverage of the target less its standard deviation: high where the "
@@ -96,6 +100,7 @@ def on_page(text: str, known: set[str] | None = None) -> Words:
     """
     made: Words = []
     at, text = 0, _TERMINAL.sub("", _PLACE.sub("", text))
+    text = _STRIP.sub(r"a strip of \1 x \2 mm", _DISC.sub(r"a disc of \1 mm", text))
     known = set() if known is None else known
     for match in sorted((*_KEY.finditer(text), *_TERM.finditer(text)), key=lambda one: one.start()):
         found = match[0]
@@ -117,11 +122,11 @@ def on_page(text: str, known: set[str] | None = None) -> Words:
     return [*made, *[text[at:]] * (at < len(text))]
 
 
-_LINE = re.compile(r"(?m)^(?:.*\.toml:\d+: )?(?:vary\.)?([a-z][\w.]*): (.+)$")
+_LINE = re.compile(r"(?m)^(?:.*\.toml:\d+: )?(?:vary\.|--)?([a-z][\w.-]*): (.+)$")
 
 
 def at_keys(text: str) -> dict[str, Words]:
-    """Return what a message says of each key with which one of its lines begins.
+    """Return what a message says of each key or option with which one of its lines begins.
 
     >>> at_keys("a/design.toml:9: chamber.height_mm: given -5; allowed: from 2 mm")
     {'chamber.height_mm': ['given -5; allowed: from 2 mm']}

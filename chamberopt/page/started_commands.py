@@ -15,7 +15,7 @@ from typing import IO, Any
 
 from chamberopt.common.child import GRACE_S, start_python
 from chamberopt.common.errors import InputError
-from chamberopt.page.page_words import on_page
+from chamberopt.page.page_words import at_keys, on_page
 
 WARNING = "warning: "  # begins a line
 JSON = "--json"  # option of a command that is asked for JSON
@@ -62,9 +62,9 @@ class StartedCommand:
 
         The value `exit` is the exit status of the command, or None while it runs. `result` is the
         folder of the result that it will leave, if any. `printed` are its lines in the words of the
-        page, as its warnings are; `fault` are those where it failed. `answer` is what a command
-        that was asked for JSON has answered, or None. `draft` is a proposal before its pilots,
-        while the command runs.
+        page, as its warnings are; `fault` are those where it failed, and `at` has what the last of
+        them says of an option. `answer` is what a command that was asked for JSON has answered, or
+        None. `draft` is a proposal before its pilots, while the command runs.
         """
         code = self._process.poll()
         if code is not None:
@@ -82,6 +82,7 @@ class StartedCommand:
             "warnings": [on_page(text) for text in warnings],
             "printed": printed,
             "fault": printed if code else [],
+            "at": at_keys(lines[-1]) if code and lines else {},
             "exit": code,
             "draft": self._draft if code is None else None,
             "answer": json.loads("".join(self._answer)) if self._answer and code == 0 else None,

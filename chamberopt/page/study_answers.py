@@ -158,7 +158,7 @@ def candidate_answer(folder: Path, number: int, design: Design) -> dict[str, obj
     return {
         "number": number,
         "kind": _kind(trial),
-        "reason": trial.reason,
+        "reason": on_page(trial.reason),
         "values": values,
         "numbers": [(title_with_unit(name), str(one)) for name, one in values.items()],
         "figures": list(dict(figures).items()),

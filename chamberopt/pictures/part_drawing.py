@@ -103,6 +103,8 @@ SCALES = np.concatenate([_STEPS[::-1], 1.0 / _STEPS[1:]])  # from large to small
 # Room on paper [mm] round a view for its dimensions: left and right, above, below.
 BESIDE, ABOVE, BELOW = 11.0, 9.0, 12.0
 WIDER = 0.1  # mm: a cavity that is wider than its sonotrode by more has its own dimension
+# mm on paper, lower left and upper right of what is round a plan without words and dimensions
+FREE = (-8.0, -8.0), (8.0, 2.0)
 FACE = 2.5  # mm on paper, thickness of the drawn sonotrode
 MOST_OUTSIDE = 6.0  # mm on paper, most of the part that is drawn outside the chamber
 ROOM, PART, TARGET = "#e8f1f7", "#c9ced3", KINDS["target"].colour
@@ -374,6 +376,8 @@ def _draw_face(axes: Axes, chamber: Chamber, view: View, face: Face) -> list[str
     Return what was drawn, in words.
     """
     from matplotlib.patches import Rectangle
+    from matplotlib.path import Path
+    from matplotlib.transforms import Bbox
 
     floor = chamber.triangles[chamber.tags == TAG_SONOTRODE]
     area = inside(1e3 * chamber.vertices[border_edges(floor)][:, :, :2])
@@ -389,13 +393,11 @@ def _draw_face(axes: Axes, chamber: Chamber, view: View, face: Face) -> list[str
     found = ["the joints of the floor's blocks"] if face.count > 1 else []
     if (np.array(face.sides_mm) > np.ptp(area.vertices, axis=0) + WIDER).any():
         rim = view.place(1e3 * face.outline[[*range(len(face.outline)), 0]])
-        (line,) = axes.plot(*rim.T, color=SONOTRODE, zorder=0.5, **look)  # below words
-        (left, foot), (right, top) = view.place(np.array([view.low, view.high]))
-        size = right - left + 2.0 * BESIDE, top - foot + 2.0 * BESIDE
-        line.set_clip_path(
-            Rectangle((left - BESIDE, foot - BESIDE), *size, transform=axes.transData)
-        )
-        found.append("the sonotrode's rim")
+        low, high = view.place(np.array([view.low, view.high])) + np.array(FREE)
+        if Path(rim).intersects_bbox(Bbox([low, high]), filled=False):
+            (line,) = axes.plot(*rim.T, color=SONOTRODE, zorder=0.5, **look)  # below words
+            line.set_clip_path(Rectangle(tuple(low), *(high - low), transform=axes.transData))
+            found.append("the sonotrode's rim")
     return found
 
 

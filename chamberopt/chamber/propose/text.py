@@ -20,6 +20,7 @@ from chamberopt.chamber.propose.quicker import HALF
 from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import AIMS
 from chamberopt.common.number_text import rounded
+from chamberopt.common.toml_fields import allowed_range
 from chamberopt.design.almen_strip import USUAL_K, USUAL_K_LOG_SD
 from chamberopt.design.load import Design, with_paths_from
 
@@ -216,8 +217,12 @@ def study_of_design(
             `design`.
     """
     accuracy = design.process.accuracy
+    least, most = allowed_range(type(accuracy).model_fields["simulated_time_s"])
     each = accuracy.replicas * accuracy.simulated_time / SEARCH_REPLICAS
-    return study_lines(name, bounds, notes, evaluations, goal, each)
+    text = study_lines(name, bounds, notes, evaluations, goal, min(max(each, least), most))
+    if accuracy.max_replicas < SEARCH_REPLICAS and "max_replicas" not in goal.accuracy:
+        text += f"max_replicas = {SEARCH_REPLICAS}  # the design has fewer than the search\n"
+    return text
 
 
 def study_lines(

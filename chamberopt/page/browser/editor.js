@@ -82,7 +82,7 @@ async function followShape() {
 function followCavity() {
   clearTimeout(timer);
   find("said").classList.add("waiting");
-  busy("cutting the part out of the chamber …");
+  busy("checking the chamber …");
   document.body.dataset.checked = "";
   const mine = ++round;
   timer = setTimeout(async () => {

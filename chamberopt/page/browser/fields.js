@@ -33,13 +33,13 @@ const label = (field) => element("label", { title: `${field.name} in the file`, 
   element("b", { textContent: field.label }), " ", ...onPage(field.text),
   ...(field.reason.length ? [element("small", {}, element("span", { className: "changed-by" }), element("span", { className: "reason" }, ...onPage(field.reason)))] : []));
 
-// The reason of a number is that of the number in the file, and is struck where that was changed.
+// The reason of a number is that of the number in the file, and is dim where that was changed: it may say what the number is, too.
 function showReason(row, field, now) {
   const [changed, reason] = [".changed-by", ".reason"].map((name) => row.querySelector(name)), was = original(field.name);
   if (!reason || reason.textContent.startsWith("changed by you")) return;
   const isChanged = now !== was;
   changed.textContent = isChanged ? `changed by you; ${state.file.is_proposed ? "proposed was" : "in the file it is"} ${was ?? "none"}. ` : "";
-  reason.classList.toggle("struck", isChanged);
+  reason.classList.toggle("past", isChanged);
 }
 
 function choiceRow(field) {
@@ -115,12 +115,12 @@ function numberRow(field) {
   slider.addEventListener("change", endMove);
   box.addEventListener("change", () => {
     const text = box.value.trim().replace(",", "."), now = text === "" ? null : Number(text);
-    if (Number.isNaN(now)) sayAtFields({ [field.name]: `given ${box.value}, which is no number` });
-    else change({ [field.name]: now });
+    if (!Number.isNaN(now)) { change({ [field.name]: now }); return; }
+    sayOwn(row, `${box.value} is no number: what was there stays.`);
+    box.value = value(field.name) ?? "";
   });
   for (const end of [low, high]) end.addEventListener("change", () => {
-    const why = bound([Number(low.value), Number(high.value)]);
-    sayAtFields(why ? { [field.name]: why } : {});
+    sayOwn(row, bound([Number(low.value), Number(high.value)]));
   });
   const more = element("div", { className: "ends" }, low, "…", high), vary = [];
   if (field.varies && !field.fixed) {
@@ -133,6 +133,7 @@ function numberRow(field) {
   }
   const unit = element("small", { textContent: field.fixed ? "catalogue" : field.unit });
   const row = element("div", { className: "field" }, label(field), ...vary, slider, box, unit, more);
+  row.addEventListener("input", () => sayOwn(row, ""));
   more.hidden = true;
   row.addEventListener("focusin", () => { more.hidden = false; });
   row.addEventListener("pointerenter", () => { more.hidden = false; });
@@ -142,7 +143,18 @@ function numberRow(field) {
   return row;
 }
 
-export function showValues() { for (const [name, { show }] of rows) show(value(name)); }
+export function showValues() {
+  for (const [name, { show, row }] of rows) {
+    show(value(name));
+    sayOwn(row, "");
+  }
+}
+
+// Say in the row of a number what was not taken of what was typed there, until something is typed or changed.
+function sayOwn(row, words) {
+  row.querySelector(".own")?.remove();
+  if (words) row.append(element("p", { className: "wrong own", role: "alert", textContent: words }));
+}
 
 // Let a search change these numbers, between these ends, and no others.
 export function varyOnly(asked) {
@@ -158,7 +170,7 @@ export const bound = (name, wanted) => rows.get(name).bound(wanted);
 
 // Say what is wrong at the fields of the keys that a message names; a pair of numbers at its first.
 export function sayAtFields(faults = {}) {
-  for (const old of document.querySelectorAll(".field > .wrong")) old.remove();
+  for (const old of document.querySelectorAll(".field > .wrong:not(.own)")) old.remove();
   for (const [name, words] of Object.entries(faults)) {
     const { row } = rows.get(name) ?? rows.get(`${name}.0`) ?? {};
     row?.append(element("p", { className: "wrong", role: "alert" }, ...onPage(words)));

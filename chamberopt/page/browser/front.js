@@ -1,5 +1,5 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
-import { asLines, ask, attempt, element, onPage, unpack, warning, wordsOf } from "./state.js";
+import { asLines, ask, attempt, element, onPage, unpack, warning } from "./state.js";
 import { followed, sinceBegin, stage } from "./steps.js";
 import { colourByState, lights } from "./surfaces.js";
 
@@ -51,6 +51,7 @@ async function draw(part) {
   if (drawn === drawnPart && !view.get("walls")) return;
   view.highlight("part", null);
   for (const name of ["part", ...CHAMBER]) view.remove(name);
+  tools.renew();
   drawnPart = drawn;
   if (!part) return;
   const told = unpack(await ask("/view", { part, unit: known.unit }));
@@ -76,6 +77,8 @@ async function drawChamber(isDraft) {
   if (isFirst) find("made").scrollIntoView({ behavior: "smooth" });
   const answer = unpack(await ask("/chamber", {}));
   if (!seen || answer.state.length !== seen.triangles.length / 3) return; // of another part
+  tools.renew();
+  view.highlight("part", null); // the target has its own colour
   view.pose("part", answer.rotation, answer.shift);
   colourByState(view, "part", seen, answer.state);
   view.surface("walls", { points: answer.points, triangles: answer.walls, kind: "wall" });
@@ -206,31 +209,36 @@ function withBalls(size) {
 const WISHES = ["material", "intensity", "coverage", "shop", "calibration", "shot", "ball-mm", "pose", "shape"]; // options of `new`
 const NUMBERS = ["intensity", "coverage", "ball-mm"];
 
-// Say a message beside the field of the option that it begins with; give whether there is such a field.
-function besideField(text, words) {
-  for (const one of document.querySelectorAll(".wrong")) one.remove();
-  for (const id of WISHES) find(id).removeAttribute("aria-invalid");
-  const id = /^--([\w-]+): /.exec(text)?.[1], field = find(id), fold = field?.closest("details");
-  if (!WISHES.includes(id)) return false;
-  if (fold) fold.open = true;
-  field.setAttribute("aria-invalid", "true");
-  field.after(element("span", { className: "wrong", role: "alert" }, ...onPage(words)));
-  field.focus();
-  return true;
+// Say what is wrong of each option beside its field, the first of which gets the focus; give whether there is one.
+function besideFields(at) {
+  for (const id of WISHES) unsay(id);
+  const wrong = WISHES.filter((id) => id in at).reverse();
+  for (const id of wrong) {
+    const field = find(id), fold = field.closest("details");
+    if (fold) fold.open = true;
+    field.setAttribute("aria-invalid", "true");
+    field.after(element("span", { className: "wrong", role: "alert" }, ...onPage(at[id])));
+    field.focus();
+  }
+  return wrong.length > 0;
+}
+
+function unsay(id) {
+  if (!find(id).hasAttribute("aria-invalid")) return;
+  find(id).removeAttribute("aria-invalid");
+  find(id).nextSibling.remove();
 }
 
 // What is wrong of a field is no longer said once the field has changed.
-for (const id of WISHES) for (const name of ["input", "change"]) find(id).addEventListener(name, () => {
-  if (find(id).hasAttribute("aria-invalid")) besideField("");
-});
+for (const id of WISHES) for (const name of ["input", "change"]) find(id).addEventListener(name, () => unsay(id));
 
 const ticked = () => [...find("names").querySelectorAll("input")];
 async function started(target) {
   const wishes = Object.fromEntries(WISHES.map((id) => [id, find(id).value.trim()]));
   for (const id of NUMBERS) wishes[id] = wishes[id].replace(/(\d),(?=\d)/g, "$1."); // a decimal comma
-  besideField("");
+  besideFields({});
   try { return await ask("/propose", { ...known, ...wishes, target, pilot: find("pilot").checked }); } catch (error) {
-    if (!besideField(error.message, wordsOf(error))) throw error;
+    if (!besideFields(error.at ?? {})) throw error;
     return null;
   }
 }
@@ -260,14 +268,18 @@ async function follow(begun) {
   const ended = await following;
   following = null;
   find("propose").disabled = !known.part;
-  if (ended.exit !== 0) find("made").hidden = besideField(ended.lines.at(-1) ?? "", ended.fault.at(-1));
+  if (ended.exit !== 0) find("made").hidden = besideFields(ended.at);
   else find("open-made").focus({ preventScroll: true });
 }
 
 find("propose").addEventListener("click", () => attempt(() => propose(ticked().filter((one) => one.checked).map((one) => one.value))));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
-attempt(async () => look(await show())).then(() => { document.body.dataset.ready = "yes"; });
-attempt(async () => { // of before a reload, or before a design was opened
-  const now = await ask("/status");
-  if (now.command?.startsWith("chamberopt new ")) await follow(now);
+attempt(async () => {
+  const now = await ask("/status"), { part, unit, target = [] } = now.asked ?? {}; // of before a reload, or before a design was opened
+  const chosen = await show(part);
+  await attempt(() => look(chosen, unit));
+  proposed = target;
+  for (const one of ticked()) one.checked = target.includes(one.value);
+  document.body.dataset.ready = "yes";
+  if (now.asked) await follow(now);
 });

@@ -1,6 +1,5 @@
 // Results below the design's folder: in 3D, one or two side by side, with report and process sheet.
-import { ask, attempt, change, element, listen, onPage, say, state } from "./state.js";
-import { isBusy, start } from "./run.js";
+import { asLines, ask, attempt, change, element, listen, onPage, say, state } from "./state.js";
 import { followStudy } from "./study/study.js";
 
 const find = (id) => document.getElementById(id), list = find("result-list");
@@ -22,8 +21,8 @@ async function refresh(tick = ticked) {
     const item = element("li", {}, element("label", {}, box, ` ${row.folder}`), element("small", {}, ...onPage(row.words)));
     if (row.stale) item.append(element("small", { className: "warning", textContent: row.stale }));
     if (row.is_study) item.append(button("see its candidates", () => followStudy(row.folder)), " ");
-    for (const [command, file, name] of row.unusable ? [] : FILES)
-      item.append(row[file] ? link(row.folder, file, `open the ${name}`) : maker(command, row.folder, file, name), " ");
+    for (const [paper, file, name] of row.unusable ? [] : FILES)
+      item.append(row[file] ? link(row.folder, file, `open the ${name}`) : maker(paper, row.folder, file, name), " ");
     return item;
   }));
   if (!rows.length) list.append(element("li", { textContent: "none yet: simulate, or run a study" }));
@@ -32,28 +31,36 @@ async function refresh(tick = ticked) {
   find("stale").replaceChildren(...stale.map((row) => element("p", { className: "warning", textContent: `${row.folder}: ${row.stale}` })));
 }
 
-function maker(command, folder, file, name) {
-  const made = button(`make the ${name}`, (event) => make(event.target, command, folder, file, name));
+function maker(paper, folder, file, name) {
+  const made = button(`make the ${name}`, (event) => make(event.target, paper, folder, file, name));
   made.dataset.make = name;
   return made;
 }
 
-// One command runs at a time.
-function allow() {
-  find("make-later").hidden = !isBusy();
-  for (const one of list.querySelectorAll("[data-make]")) Object.assign(one, { disabled: isBusy(), title: isBusy() ? find("make-later").textContent : "" });
-}
-document.addEventListener("running", allow);
+// One report or sheet is made at a time, beside a command that runs.
+const EVERY = 500; // ms between looks at it
+let making = false;
+function allow() { for (const one of list.querySelectorAll("[data-make]")) one.disabled = making; }
 
-async function make(pressed, command, folder, file, name) {
+async function make(pressed, paper, folder, file, name) {
   const before = pressed.textContent;
-  Object.assign(pressed, { disabled: true, className: "at-work", textContent: `making the ${name} …` });
+  making = true;
+  allow();
+  Object.assign(pressed, { className: "at-work", textContent: `making the ${name} …` });
   await attempt(async () => {
-    if ((await start(command, folder)).exit !== 0) throw new Error(find("printed").textContent);
+    let now = await ask("/make", { paper, of: folder });
+    while (now.exit === null) {
+      await new Promise((done) => { setTimeout(done, EVERY); });
+      now = await ask("/made", {});
+    }
+    if (now.exit !== 0) throw Object.assign(new Error(), { words: asLines(now.fault) });
+    making = false;
     await refresh();
     say([`The ${name} of ${folder} is made: `, link(folder, file, "open it")], true);
   });
-  Object.assign(pressed, { disabled: isBusy(), className: "", textContent: before }); // where it could not be made
+  making = false;
+  allow();
+  Object.assign(pressed, { className: "", textContent: before }); // where it could not be made
 }
 
 find("show-results").addEventListener("click", () => attempt(() => show()));

@@ -84,7 +84,7 @@ function showLimits() {
     side.addEventListener("change", () => { one.side = side.value; });
     box.addEventListener("change", () => { one.value = box.value; });
     const out = element("button", { type: "button", textContent: "✕", title: "leave this limit out" });
-    out.addEventListener("click", () => { limits = limits.filter((other) => other !== one); showLimits(); });
+    out.addEventListener("click", () => { limits = limits.filter((other) => other !== one); showLimits(); unsay(); });
     return element("li", {}, figure, side, box, out);
   }));
 }
@@ -99,6 +99,7 @@ function showVaried() {
   const items = [...varied].map((name) => {
     const { in_full } = state.fields.find((one) => one.name === name);
     const [low, high] = ends.get(name).map((value, k) => element("input", { type: "number", step: "any", value, ariaLabel: `${in_full}, ${["least", "largest"][k]}` }));
+    for (const end of [low, high]) end.addEventListener("input", () => end.closest("li").querySelector(".wrong")?.remove());
     for (const end of [low, high]) end.addEventListener("change", () => {
       const why = bound(name, [Number(low.value), Number(high.value)]);
       putBack = why ? [name, why] : [];
@@ -112,12 +113,6 @@ function showVaried() {
 }
 document.addEventListener("varied", showVaried);
 
-// Start a command, follow it to its end, and give its exit status, and the folder of its result.
-export async function start(command, of) {
-  const started = await ask("/start", { command, of, points: find("points").value });
-  return { exit: await follow(started), result: started.result };
-}
-
 // Follow a command to its end, and tell what it has left.
 export async function followToEnd(started) {
   const exit = await follow(started);
@@ -125,9 +120,6 @@ export async function followToEnd(started) {
   tell("ended", exit === 0 ? started.result : "");
 }
 const tell = (name, detail) => document.dispatchEvent(new CustomEvent(name, { detail }));
-
-// Whether a command runs: a second one has to wait for its end.
-export const isBusy = () => isRunning;
 
 // Folder of the study that runs now, or "".
 export const running = () => study;
@@ -142,9 +134,7 @@ function show({ command, result, steps, seconds, printed, exit }) {
   study = exit === null && isStudy(command) ? result : "";
   if (study && study !== before) tell("study", study);
   find("stop").disabled = exit !== null;
-  const wasRunning = isRunning;
   isRunning = exit === null;
-  if (isRunning !== wasRunning) tell("running", isRunning);
   allow();
   const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
   find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...toResult(command, result, exit));
@@ -185,6 +175,9 @@ find("more-of").addEventListener("click", () => attempt(async () => {
   await followToEnd(started);
 }, find("run-fault")));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
+// What was refused is no longer said once something else is asked.
+const unsay = () => { find("run-fault").textContent = find("search-fault").textContent = ""; };
+find("run").addEventListener("input", unsay);
 // Write the study of the sliders, and run it.
 find("search-sliders").addEventListener("click", () => attempt(async () => {
   const vary = Object.fromEntries([...varied].map((name) => [name, ends.get(name)]));

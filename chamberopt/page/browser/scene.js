@@ -1,5 +1,5 @@
 // The view: part and chamber as the newest answers have them, and handles that turn and move the part.
-import { change, endMove, unpack, value } from "./state.js";
+import { change, endMove, state, unpack, value } from "./state.js";
 import { colourByState } from "./surfaces.js";
 
 const BODIES = ["deflectors", "holder", "mask"]; // that not every chamber has
@@ -18,6 +18,8 @@ export function showPart(buffer) {
 
 // What `shape` answers: at once, without the part taken out.
 export function showShape(answer) {
+  if (placed?.form === answer.form) { placed = answer; return; } // what is drawn holds until the newest cavity is there
+  tools.renew();
   view.pose("part", answer.rotation, answer.shift);
   view.get("part").visible = true;
   for (const name of ["remeshed", ...BODIES]) view.remove(name); // until the cavity is cut anew
@@ -26,18 +28,17 @@ export function showShape(answer) {
   const first = !placed;
   placed = answer;
   if (first) lookAtAll();
+  else if (state.showing && isBeyond(answer.shape_mm)) lookAtAll(view.camera.position.clone().sub(view.orbit.target).normalize().toArray());
   dimensions();
   if (grip && !handles.dragging) grip.position.set(...middle());
 }
 
 // What `cavity` answers: exactly what the shot flies in.
 export function showCavity(answer) {
+  for (const name of ["remeshed", ...BODIES]) view.remove(name); // of the cavity before
   walls(answer);
-  if (answer.part_points) {
-    view.surface("remeshed", { points: answer.part_points.slice(), triangles: answer.part_triangles.slice(), open: !part.closed });
-    view.get("part").visible = false;
-    view.section.change();
-  }
+  if (answer.part_points) view.surface("remeshed", { points: answer.part_points.slice(), triangles: answer.part_triangles.slice(), open: !part.closed });
+  view.show(["part"], !answer.part_points);
   showState(answer.state);
 }
 
@@ -76,12 +77,15 @@ const mid = (a, b) => a.map((x, i) => 0.5 * (x + b[i]));
 const middle = () => mid(...placed.part_mm);
 const short = (x) => String(Number(x.toPrecision(4)));
 
-function lookAtAll() {
+let fitted = null; // lowest and highest corner of what was last looked at as a whole
+const isBeyond = ([low, high]) => low.some((x, i) => x < fitted[0][i] - 0.1) || high.some((x, i) => x > fitted[1][i] + 0.1);
+function lookAtAll(way = placed.way) {
   // A part that goes far out of its chamber is not seen to its end.
   const [inner, outer] = placed.shape_mm, room = 0.4 * Math.hypot(...outer.map((x, i) => x - inner[i]));
   const low = inner.map((x, i) => Math.min(x, Math.max(x - room, placed.part_mm[0][i])));
   const high = outer.map((x, i) => Math.max(x, Math.min(x + room, placed.part_mm[1][i])));
-  const size = Math.hypot(...high.map((x, i) => x - low[i])), centre = mid(low, high), { way } = placed;
+  const size = Math.hypot(...high.map((x, i) => x - low[i])), centre = mid(low, high);
+  fitted = [low, high];
   view.look({ middle: centre, eye: centre.map((x, i) => x + 2.6 * size * way[i]), size });
 }
 

@@ -19,10 +19,19 @@ export async function ask(path, question) {
   const answer = await fetch(path, request).catch(() => { throw new Error("the server has ended: start chamberopt edit again"); });
   const isBytes = answer.headers.get("content-type") === "application/octet-stream";
   if (isBytes) return answer.arrayBuffer();
-  if (answer.status === 403) throw new Error(await answer.text());
+  if (answer.status === 403) return refused(await answer.text());
   const told = await answer.json().catch(() => ({ error: `the server failed at this (${answer.status})` }));
   if (told.superseded || told.error) throw Object.assign(new Error(told.error), { superseded: Boolean(told.superseded), words: told.words, at: told.at });
   return told;
+}
+
+// A tab that the server does not know shows that alone, and goes on with nothing; one that it has served before keeps what is there.
+async function refused(why) {
+  if (document.body.dataset.ready) throw new Error(why);
+  document.body.className = "refused";
+  document.body.replaceChildren(element("h1", { textContent: "This tab cannot use the program" }),
+    element("p", { textContent: "Its address lacks the token, or has that of a program that has ended. Go on in the tab that was opened first, or open the whole address that chamberopt edit has printed in the terminal, to the last letter of its token." }));
+  return new Promise(() => {});
 }
 
 // A packed answer (see answers.py): its head, with the arrays by name.

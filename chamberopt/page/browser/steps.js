@@ -33,7 +33,7 @@ function time({ step, done, total }, within) {
   if (now - begin.since < SHORT || (total && done >= total)) return "";
   const seconds = (now - begin.at) * (total - all) / (all - begin.done);
   if (!total || now - begin.at < SHORT || !(seconds < Infinity)) return `, for ${inWords(now - begin.since)} so far`;
-  return `, ${all < total / 10 ? "roughly" : "about"} ${inWords(seconds)} left`;
+  return `, ${all < total / 10 ? "roughly" : "about"} ${inWords(seconds)} left of this step`;
 }
 
 // For how long a command has worked.

@@ -19,7 +19,7 @@ export function lights(named, view, answer, colour) {
     if (isOn) view.highlight("part", found, colour());
   });
   const hide = () => {
-    if (named.querySelector(":checked")) return; // what is chosen stays lit
+    if (named.querySelector(":checked") && !view.get("walls")) return; // what is chosen stays lit, until a chamber shows it as its target
     isOn = false;
     view.highlight("part", null);
   };

@@ -76,6 +76,10 @@ function showBorders() {
   find("of-crease").hidden = byCadFaces();
 }
 find("cad-face").addEventListener("change", showBorders);
+find("crease").addEventListener("input", () => {
+  const { value, min, max } = find("crease"), isRight = find("crease").validity.valid && value !== "";
+  find("crease-fault").textContent = isRight ? "" : `given ${value || "no number"}; allowed: from ${min} to ${max}°`;
+});
 
 // Number of the face of each triangle that a click takes; null until the server has found faces up to these creases.
 let creased = {};

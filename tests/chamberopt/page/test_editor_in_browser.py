@@ -67,6 +67,28 @@ def test_a_number_changes_the_shape_the_facts_and_one_line(opened: Page) -> None
     assert said == [one.text for one in told]
 
 
+def test_what_is_drawn_stays_where_no_form_has_changed(opened: Page) -> None:
+    page, held = opened.page, []
+    drawn = """async () => {
+      const { view } = await import("/browser/scene.js");
+      return view.get("walls").uuid;
+    }"""
+    opened.wait("data-checked=reach")
+    page.route("**/cavity", lambda route: held.append(route))
+    for name, value, is_kept in (("shot.mass_g", 4, True), ("chamber.height_mm", 31, False)):
+        before, shapes = page.evaluate(drawn), page.evaluate("document.body.dataset.shape")
+        opened.put(name, value)
+        expect(page.locator("body")).not_to_have_attribute("data-shape", shapes, timeout=WAIT)
+        assert (page.evaluate(drawn) == before) == is_kept
+        assert page.locator("#said.waiting").count() == 1
+    page.unroute("**/cavity")
+    for route in held:
+        route.continue_()
+    page.click("#undo")
+    page.click("#undo")
+    opened.wait("data-checked=reach")
+
+
 def test_a_slider_has_its_ends_again_after_undo(opened: Page) -> None:
     slider = opened.page.locator("[type=range][aria-label='chamber.height_mm']")
     before = [slider.get_attribute(end) for end in ("min", "max")]
@@ -74,6 +96,38 @@ def test_a_slider_has_its_ends_again_after_undo(opened: Page) -> None:
     assert [slider.get_attribute(end) for end in ("min", "max")] == [before[0], "200"]
     opened.page.click("#undo")
     assert [slider.get_attribute(end) for end in ("min", "max")] == before
+    opened.wait("data-checked=reach")
+
+
+def test_what_was_not_taken_is_said_until_something_else_is(opened: Page) -> None:
+    page, name = opened.page, "shot.mass_g"
+    row = page.locator(".field", has=page.locator(f'[id="{name}"]'))
+    box, wrong = page.locator(f'[id="{name}"]'), row.locator(".wrong")
+    before = box.input_value()
+    opened.put(name, -3)
+    expect(page.locator("#error")).to_contain_text("given -3", timeout=WAIT)
+    box.fill("abc")
+    box.press("Tab")
+    expect(wrong.last).to_have_text("abc is no number: what was there stays.")
+    expect(box).to_have_value("-3")  # as the panel says
+    page.click("#undo")
+    expect(box).to_have_value(before)
+    expect(page.locator("#error")).to_be_hidden(timeout=WAIT)
+    expect(wrong).to_have_count(0)
+    row.hover()
+    low = row.locator(".ends input").first
+    was = low.input_value()
+    low.fill("9999")
+    low.press("Tab")
+    expect(wrong).to_contain_text("9999 is not less than")
+    low.fill(was)
+    expect(wrong).to_have_count(0)
+    opened.tab("target")
+    for crease, words in (("400", "given 400; allowed: from 0.1 to 180°"), ("30", "")):
+        page.locator("#crease").evaluate("(one, text) => { one.value = text; }", crease)
+        page.locator("#crease").dispatch_event("input")
+        expect(page.locator("#crease-fault")).to_have_text(words)
+    opened.tab("numbers")
     opened.wait("data-checked=reach")
 
 
@@ -100,11 +154,14 @@ def test_a_young_run_tells_the_time_that_is_left(opened: Page) -> None:
         ["replicas: 0 of 24"],
         ["replicas: 0 of 24, for 10 s so far"],
         ["replicas: 0 of 24, for 10 s so far"],
-        ["replicas: 0 of 24, roughly 16 min left"],
+        ["replicas: 0 of 24, roughly 16 min left of this step"],
         ["drawing"],
         ["evaluations: 0 of 10", "replicas: 0 of 24"],
         ["evaluations: 0 of 10", "replicas: 6 of 24"],
-        ["evaluations: 0 of 10, roughly 4 min left", "replicas: 12 of 24, about 10 s left"],
+        [
+            "evaluations: 0 of 10, roughly 4 min left of this step",
+            "replicas: 12 of 24, about 10 s left of this step",
+        ],
     ]
 
 
@@ -231,13 +288,25 @@ def test_the_legend_hides_a_kind_and_the_view_turns_to_an_axis(opened: Page) -> 
         page.click("#undo")
 
 
-def test_the_wheel_zooms_only_after_a_click_or_with_ctrl(opened: Page) -> None:
+def test_the_wheel_zooms_only_after_a_click_or_with_ctrl_where_a_page_scrolls(opened: Page) -> None:
     page = opened.page
     box = page.locator("#view canvas").bounding_box()
     far = """async () => { const { view } = await import("/browser/scene.js");
         return view.camera.position.distanceTo(view.orbit.target); }"""
     place, before = (box["x"] + 30, box["y"] + 400), page.evaluate(far)
     page.click("h1, header", position={"x": 2, "y": 2})
+    page.mouse.move(*place)
+    page.mouse.wheel(0, -200)
+    page.wait_for_timeout(200)
+    assert page.evaluate(far) < 0.99 * before  # the editor does not scroll
+    page.evaluate(
+        """() => {
+        const long = Object.assign(document.createElement("div"), { id: "long" });
+        long.style = "position: absolute; top: 0; height: 3000px; width: 1px";
+        document.body.append(long);
+        document.body.style.overflow = "visible"; }"""
+    )
+    before = page.evaluate(far)
     for click, key in ((False, ""), (False, "Control"), (True, "")):
         if click:
             page.mouse.click(*place)
@@ -251,6 +320,7 @@ def test_the_wheel_zooms_only_after_a_click_or_with_ctrl(opened: Page) -> None:
         now = page.evaluate(far)
         assert (now < 0.99 * before) == (click or bool(key))
         before = now
+    page.evaluate("document.getElementById('long').remove(), document.body.style.overflow = ''")
     page.locator("#view").dblclick(position={"x": 30, "y": 400})
 
 
@@ -565,6 +635,9 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     page.click("#search-sliders")
     expect(page.locator("#search-fault")).to_contain_text("design.toml")
     expect(page.locator("#search-fault")).to_be_in_viewport()
+    page.fill("#evaluations", "3")
+    expect(page.locator("#search-fault")).to_be_empty()  # of another question
+    page.fill("#evaluations", "2")
     page.fill("#study-name", "stopped")
     page.click("#search-sliders")
     expect(page.locator("#message")).to_contain_text("written: stopped.toml")
@@ -572,7 +645,6 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     expect(page.locator("#study-progress")).to_contain_text("at work for")
     opened.tab("results")
     expect(page.locator("#study-view")).to_be_hidden()
-    expect(page.locator("#make-later")).to_be_visible()
     opened.tab("run")
     expect(page.locator("#study-view")).to_be_visible()
     page.click("#study-stop")
@@ -633,7 +705,6 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     inner = bar["y"] + page.evaluate("document.getElementById('shown').clientTop")
     assert button["y"] + button["height"] <= inner  # nothing is below it
     row.get_by_text("make the report").click()
-    expect(page.locator("#make-later")).to_be_visible()
     expect(row.get_by_text("make the process sheet")).to_be_disabled()
     with page.expect_popup(timeout=WAIT) as report:
         page.locator("#message").get_by_text("open it").click(timeout=WAIT)

@@ -107,6 +107,10 @@ def test_a_wrong_file_or_wish_is_answered_in_words(front: Served, tmp_path: Path
         ({"intensity": "0.15A"}, "--intensity: it takes pilot runs"),
     ):
         assert said in front.ask("/propose", PROPOSED | wish)["error"]
+    several = {"pose": "up", "intensity": "banana", "coverage": "5", "ball-mm": "-3"}
+    answer = front.ask("/propose", PROPOSED | several)
+    assert {*answer["at"]} == {*several}  # all of them at once
+    assert answer["at"]["ball-mm"][0].startswith("given -3; allowed")
     for option in ("part", "shop", "calibration"):
         error = front.ask("/propose", PROPOSED | {option: "../x.stl"})["error"]
         assert "outside the folder" in error

@@ -1,10 +1,12 @@
 """The front page in a real browser: from a part's file to an open design, without a terminal."""
 
+import re
 from pathlib import Path
 
 from tests.chamberopt.page.browser_page import Page
 from tests.chamberopt.page.conftest import Served
 from tests.helpers.results.browser import chromium, expect, needs_chromium
+from tests.hunt.meshes import ROOT
 
 pytestmark = needs_chromium
 # Where the corner at x = 1 of a marked surface is drawn after the surface was turned and moved.
@@ -55,7 +57,7 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             page.fill("#coverage", "50")
             page.click("#propose")
             wrong = page.locator("#coverage + .wrong")
-            expect(wrong).to_have_text("coverage: given 50; allowed: from 100 to 1000 %")
+            expect(wrong).to_have_text("given 50; allowed: from 100 to 1000 %")
             assert page.locator("#made").is_hidden()
             page.fill("#coverage", "200")
             page.fill("#material", "Ti-6Al-4W")
@@ -90,15 +92,16 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             expect(page.locator("#view")).not_to_have_attribute("data-highlight", "12")
             assert page.evaluate(MARKED_BEFORE_POSED) == [0, -1, 5]
             page.reload()
-            opened.wait('data-ended="0"')
+            opened.wait("data-chamber=proposal")  # round the part, in the unit that was chosen
             expect(page.locator("#sentence")).to_contain_text("my part.stl")
+            assert page.locator("#part").input_value() == "my part.stl"
             page.click("#open-made")
             opened.wait("data-checked=reach")
             label = page.locator('label[for="chamber.height_mm"]')
             expect(label).to_contain_text("Height")
             expect(label).to_contain_text("sonotrode to ceiling")  # the reason of its number
             opened.put("chamber.height_mm", 77)
-            proposed = page.locator('label[for="chamber.height_mm"] .struck')
+            proposed = page.locator('label[for="chamber.height_mm"] .past')
             expect(proposed).to_contain_text("sonotrode to ceiling")  # which is of another number
             expect(label).to_contain_text("changed by you; proposed was ")
             page.click("#undo")
@@ -108,6 +111,60 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             expect(page.locator("#designs")).to_contain_text("my part/design.toml")
             assert not opened.errors
             assert all(one.startswith(f"http://{served.host}/") for one in opened.requests)
+    finally:
+        served.process.kill()
+        served.process.communicate()
+
+
+def test_a_proposal_takes_the_place_of_what_was_seen_of_the_part(tmp_path: Path) -> None:
+    """The ticked name is lit no more, and a distance is not measured from a place on the part."""
+    (tmp_path / "fir_tree.step").write_bytes((ROOT / "designs/parts/fir_tree.step").read_bytes())
+    served = Served(tmp_path, "fir_tree.step")
+    try:
+        with chromium() as browser:
+            opened = Page(browser, served)
+            page = opened.page
+            opened.wait("data-drawn='fir_tree.step'")
+            page.check("#names input[value=FIR_TREE]")
+            view = page.locator("#view")
+            expect(view).to_have_attribute("data-highlight", re.compile(r"\d+"))
+            page.click(".tools >> text=Measure")
+            view.click()
+            told = page.locator(".tools output")
+            expect(told).to_contain_text("click the other point")
+            page.click("#more summary")
+            page.uncheck("#pilot")
+            for wish, text in (("#intensity", "banana"), ("#ball-mm", "-3")):
+                page.fill(wish, text)
+            page.click("#propose")
+            for wish in ("#intensity", "#ball-mm"):  # both at once
+                expect(page.locator(f"{wish} + .wrong")).to_contain_text("given ")
+                page.fill(wish, "")
+            expect(page.locator(".wrong")).to_have_count(0)
+            page.click("#propose")
+            opened.wait('data-ended="0"')
+            opened.wait("data-chamber=proposal")
+            expect(view).not_to_have_attribute("data-highlight", re.compile(r"\d+"))
+            expect(told).to_contain_text("click two points")
+            page.reload()
+            opened.wait("data-chamber=proposal")
+            expect(page.locator("#names input[value=FIR_TREE]")).to_be_checked()
+            assert not opened.errors
+    finally:
+        served.process.kill()
+        served.process.communicate()
+
+
+def test_a_tab_without_the_token_says_what_to_do(tmp_path: Path) -> None:
+    served = Served(tmp_path, "design.toml")
+    try:
+        with chromium() as browser:
+            opened = Page(browser, served)
+            other = opened.page.context.new_page()
+            other.goto(served.origin)  # has the cookie, but no key
+            expect(other.locator("body")).to_contain_text("This tab cannot use the program")
+            expect(other.locator("body")).to_contain_text("open the whole address")
+            assert other.locator("#busy, #view, .wrong").count() == 0
     finally:
         served.process.kill()
         served.process.communicate()

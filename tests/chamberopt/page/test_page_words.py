@@ -79,10 +79,19 @@ def test_a_command_is_named_as_the_page_has_it() -> None:
         ("and 3 more notes: --verbose shows all", "and 3 more notes"),
         ("in the lid in place of the part, 8 mm from the sonotrode: chamberopt strip",
          "in the lid in place of the part, 8 mm from the sonotrode"),
+        ("there is room for --disc-mm 16.9 or --size-mm 16.4 4: give a size, or use --at ZONE",
+         "there is room for a disc of 16.9 mm or a strip of 16.4 x 4 mm: give a size"),
+        ("give them a zone of their own (docs/how_to/drawing.md)", "give them a zone of their own"),
     ],
 )  # fmt: skip
 def test_what_only_a_terminal_needs_is_left_out(printed: str, told: str) -> None:
     assert on_page(printed) == ([told] if told else [])
+
+
+def test_what_only_the_file_can_is_said_as_that() -> None:
+    words = "leave out of it, in the file, what no ball can touch"
+    found = on_page("narrow part.target, or set part.target.reachable = true")
+    assert found[-1] == (words, "set part.target.reachable = true")
 
 
 def test_commands_in_html_are_named_as_the_page_has_them() -> None:

@@ -6,6 +6,7 @@ import select
 import signal
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,10 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.facts import describe
+from chamberopt.chamber.propose.text import GOALS, study_of_design
 from chamberopt.design.load import load_design
 from chamberopt.documents.facts import facts_in_words
+from chamberopt.page.edited_file import EditedFile
 from chamberopt.page.page_words import TERMS
 from chamberopt.search.study import load_study
 from tests.chamberopt.page.conftest import Served
@@ -91,6 +94,7 @@ def test_a_report_cannot_use_the_server(served: Served) -> None:
     [
         ("/start", {"command": "simulate", "of": "../design.toml"}, "outside the folder"),
         ("/start", {"command": "new", "of": "design.toml"}, "not a command of this page"),
+        ("/make", {"paper": "report", "of": "../other"}, "outside the folder"),
         ("/shown", {"folders": ["/etc"]}, "outside the folder"),
         ("/shown", {"folders": ["."]}, "result.json"),
         ("/study", {"name": "../s.toml", "vary": {}, "evaluations": 3}, "give a name"),
@@ -170,6 +174,38 @@ def test_a_study_is_asked_with_limits_in_the_units_of_the_page(served: Served) -
     )
     assert served.ask("/duration", {"of": "limited.toml"})["searched"] == ""
     (served.folder / "limited.toml").unlink()
+
+
+def test_a_report_is_begun_beside_a_command(served: Served) -> None:
+    started = served.ask("/start", {"command": "simulate", "of": "design.toml"})
+    assert started["exit"] is None
+    now = served.ask("/make", {"paper": "sheet", "of": "results/none"})
+    assert now["command"] == "chamberopt report ./results/none --sheet"
+    while now["exit"] is None:
+        time.sleep(0.1)
+        now = served.ask("/made", {})
+    assert now["exit"] == 2  # there is no such result
+    assert "results/none" in "".join(map(str, now["fault"]))
+    served.ask("/stop", {})
+    while json.loads(served.get("/status").read())["exit"] is None:
+        time.sleep(0.1)
+
+
+@pytest.mark.parametrize(
+    ("replicas", "most", "seconds"), [(3, 3, 1.0), (3, 3, 1e-4), (200, 200, 10_000)]
+)
+def test_a_study_of_any_accuracy_of_the_design_is_valid(
+    tmp_path: Path, replicas: int, most: int, seconds: float
+) -> None:
+    write_base(tmp_path)
+    path, study = tmp_path / "design.toml", tmp_path / "study.toml"
+    accuracy = {"replicas": replicas, "max_replicas": most, "simulated_time_s": seconds}
+    changes = {f"process.accuracy.{key}": one for key, one in accuracy.items()}
+    EditedFile(path, False).save(changes)
+    vary = {"chamber.height_mm": {"low": 20, "high": 60}}
+    for goal in GOALS.values():
+        study.write_text(study_of_design(path.name, load_design(path), vary, {}, 3, goal))
+        assert load_study(study).objective.name == goal.objective
 
 
 def test_nonsense_is_refused(served: Served) -> None:

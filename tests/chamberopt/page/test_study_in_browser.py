@@ -1,5 +1,6 @@
 """A study is followed in a real browser: new candidates appear, and each one's chamber is shown."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +12,15 @@ from tests.helpers.results.browser import WAIT, chromium, expect, needs_chromium
 from tests.helpers.results.followed_study import followed_study
 
 pytestmark = needs_chromium
+HEIGHT = "chamber.height_mm"
+# Where the highest point of the walls is on the screen.
+TOP = """async () => {
+    const { view } = await import("/browser/scene.js"), mesh = view.get("walls");
+    const at = mesh.geometry.getAttribute("position"), tops = [];
+    for (let k = 0; k < at.count; k++)
+      tops.push(view.onScreen(new THREE.Vector3().fromBufferAttribute(at, k))[1]);
+    return Math.min(...tops);
+}"""
 FIRST = 4  # candidates that are there when the page is opened
 
 
@@ -101,6 +111,14 @@ def test_a_study_is_followed_and_a_candidate_taken(opened: Page, out: Path) -> N
     )
     assert shown == pytest.approx(height, abs=1e-3)
     assert float(page.locator('[id="chamber.height_mm"]').input_value()) == 30
+    tallest = max(range(len(rows)), key=lambda k: json.loads(rows[k])["parameters"][HEIGHT])
+    listed.nth(named.index(str(tallest + 1))).click()
+    opened.wait(f"data-candidate='{tallest + 1}'")
+    opened.wait("data-checked=reach")
+    over = page.locator("#tools > .tools").bounding_box()
+    assert page.evaluate(TOP) > over["y"] + over["height"]  # it is seen as a whole
+    order.locator(".candidate[data-number='2'] .target").click()
+    opened.wait("data-candidate='2'")
     page.click("#take")
     expect(page.locator("#unsaved")).to_have_text("not saved yet")
     assert float(page.locator('[id="chamber.height_mm"]').input_value()) == height

@@ -334,6 +334,7 @@ def test_the_section_shows_the_part() -> None:
     for face, text in (
         (Face(diameter_mm=40.0), ""),
         (Face(diameter_mm=90.0), ", dashed: the sonotrode's rim"),
+        (Face(diameter_mm=400.0), ""),  # far outside of the drawing
         (
             Face(size_mm=(80.0, 80.0), columns=2),
             ", dashed: the joints of the floor's blocks and the sonotrode's rim",

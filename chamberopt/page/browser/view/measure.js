@@ -17,12 +17,20 @@ class Measure {
   }
 
   end() {
-    this.#first = null;
-    for (const view of this.views) {
-      view.tool = null;
-      for (const name of ["measured", "measured text"]) view.remove(name);
-    }
+    this.#forget();
+    for (const view of this.views) view.tool = null;
     this.tell("");
+  }
+
+  // Begin anew in another scene, where what was measured in the one before holds no more.
+  renew() {
+    this.#forget();
+    this.start();
+  }
+
+  #forget() {
+    this.#first = null;
+    for (const view of this.views) for (const name of ["measured", "measured text"]) view.remove(name);
   }
 
   #click(view, event) {

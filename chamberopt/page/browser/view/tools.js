@@ -63,6 +63,9 @@ class Tools {
     if (on) this.ruler.start(); else this.ruler.end();
   }
 
+  // Another scene is drawn: a distance to a place in the one before would mean nothing.
+  renew() { if (this.measure.ariaPressed === "true") this.ruler.renew(); }
+
   #turn(on) {
     this.section.ariaPressed = String(on);
     this.controls.hidden = !on;

@@ -9,6 +9,14 @@ const WIDE = 0.7; // width over height of a view that shows all, also what is as
 const LENS = 30, PARALLEL = 0.1; // degrees of the view from bottom to top; of an eye so far away that lines of sight are parallel
 const DEEP = 8; // sizes of what is looked at, before and behind its middle, within which all is drawn
 const halfOf = (lens) => Math.tan(lens * Math.PI / 360);
+const canScroll = (one) => one.scrollHeight > one.clientHeight;
+const flows = (one, ways) => ways.includes(getComputedStyle(one).overflowY);
+// Whether the page scrolls, or what an element is in.
+function isScrolled(element) {
+  for (let one = element.parentElement; one && one !== document.body; one = one.parentElement)
+    if (canScroll(one) && flows(one, ["auto", "scroll"])) return true;
+  return canScroll(document.documentElement) && !flows(document.body, ["hidden"]);
+}
 const END_ON = 0.97; // cosine between sight and a dimension from which on it is not drawn
 class View3D {
   #meshes = new Map();
@@ -57,13 +65,13 @@ class View3D {
     this.#resize();
   }
 
-  // The wheel zooms after a click in the view, or with Ctrl; else it scrolls the page.
+  // Where the page scrolls, the wheel zooms after a click in the view or with Ctrl only.
   #takeWheel(canvas) {
     let isOurs = false;
     this.#press = (event) => { isOurs = event.target === canvas; };
     document.addEventListener("pointerdown", this.#press, { capture: true });
     canvas.addEventListener("wheel", (event) => {
-      if (!isOurs && !event.ctrlKey) event.stopImmediatePropagation();
+      if (!isOurs && !event.ctrlKey && isScrolled(canvas)) event.stopImmediatePropagation();
     }, { capture: true, passive: true });
   }
 
