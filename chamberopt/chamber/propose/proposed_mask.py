@@ -217,6 +217,7 @@ def unlike_settings(proposal: Proposal, strips: Strips) -> str:
     In each the part is moved so that another strip of the target is where the proposed one is.
     """
     design, why = proposal.design, {}
+    proposed = _rooms(proposal.chamber)
     for number in range(strips.settings):
         by_mm = 1e3 * (strips.chosen - number) * strips.pitch
         moved: dict[str, Any] = {"part.target.box_mm": strips.box_mm(proposal.mesh, number)}
@@ -227,12 +228,15 @@ def unlike_settings(proposal: Proposal, strips: Strips) -> str:
             if "offset_mm" in part:
                 moved[f"{name}.offset_mm.0"] = part["offset_mm"][0] + by_mm
         try:
-            heights = _heights(build_chamber(design.changed(moved)))
+            rooms = _rooms(build_chamber(design.changed(moved)))
         except InputError as error:
             why[number + 1] = one_line(str(error)).partition(";")[0]
             continue
-        if np.abs(heights - _heights(proposal.chamber)).max() > 1e-3 * MOVED_MM:
-            why[number + 1] = "what of the part is within the walls there hangs lower"
+        each = list(zip(rooms, proposed, strict=True))
+        if any(abs(1e3 * (_lowest(one) - _lowest(like))) > MOVED_MM for one, like in each):
+            why[number + 1] = "what of the part is within the walls hangs lower"
+        elif any(_opens_elsewhere(one, like) for one, like in each):
+            why[number + 1] = "the part goes out of a wall elsewhere"
     if not why:
         return ""
     return (
@@ -241,10 +245,30 @@ def unlike_settings(proposal: Proposal, strips: Strips) -> str:
     )
 
 
-def _heights(chamber: Chamber) -> np.ndarray:
-    """Return the height of the part's lowest point in each step over the sonotrode [m]."""
-    rooms = chamber.steps or (chamber,)
-    return np.array([one.part.vertices[:, 2].min() for one in rooms])
+def _rooms(chamber: Chamber) -> tuple[Chamber, ...]:
+    """Return the chamber as it is in each step."""
+    return chamber.steps or (chamber,)
+
+
+def _lowest(room: Chamber) -> float:
+    """Return the height of the part's lowest point over the sonotrode [m]."""
+    return float(room.part.vertices[:, 2].min())
+
+
+def _opens_elsewhere(room: Chamber, other: Chamber) -> bool:
+    """Return whether the part goes out of a room where it does not in another one."""
+    there = find_openings(other)
+    return any(_is_elsewhere(one, _nearest(one, there)) for one in find_openings(room))
+
+
+def _nearest(one: Opening, others: Sequence[Opening]) -> Opening | None:
+    """Return the opening in the same wall that differs least from one; None if it has none."""
+    like = [other for other in others if other.wall == one.wall]
+    return min(like, key=lambda other: _moved_mm(one, other), default=None)
+
+
+def _is_elsewhere(one: Opening, near: Opening | None) -> bool:
+    return near is None or _moved_mm(one, near) > MOVED_MM
 
 
 def _moved_mm(one: Opening, other: Opening) -> float:
@@ -260,9 +284,7 @@ def moved_openings(chamber: Chamber) -> str:
     first, *others = map(find_openings, chamber.steps)
     for one in first:
         for other in others:
-            like = [x for x in other if x.wall == one.wall]
-            near = min(like, key=lambda x: _moved_mm(one, x), default=None)
-            if near is None or _moved_mm(one, near) > MOVED_MM:
+            if _is_elsewhere(one, near := _nearest(one, other)):
                 before, after = (x and format_point(np.round(x.place, 4)) for x in (one, near))
                 return (
                     f"OPENINGS MOVE in the second pose, one from {before} to {after or 'none'}: a "

@@ -1,6 +1,7 @@
 """Ends that a clamp holds outside, and faces of a part that close its chamber."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,8 +22,8 @@ from chamberopt.chamber.propose.proposed_end import (
     local_room,
     strip,
 )
-from chamberopt.chamber.propose.proposed_mask import rows_of
-from chamberopt.chamber.propose.proposed_target import Target, propose_sizes
+from chamberopt.chamber.propose.proposed_mask import rows_of, unlike_settings
+from chamberopt.chamber.propose.proposed_target import Surface, Target, propose_sizes
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.triangles import areas
 from tests.chamberopt.chamber.propose.test_proposed_arbor import drum, part_of
@@ -249,6 +250,26 @@ def test_what_no_sonotrode_carries_is_peened_a_strip_at_a_time(tmp_path: Path) -
     inside = made.chamber.exposed_area[posed.target].sum()
     assert 1e6 * inside * made.settings == pytest.approx(whole, rel=1e-3)
     assert "A STRIP AT A TIME" in made.reasons["part.target"]
+    # A plate is alike in all settings; of its ends it goes out of no wall that is closed.
+    assert made.strips is not None
+    assert unlike_settings(made, made.strips) == ""
+
+
+def test_a_setting_whose_strip_hangs_otherwise_is_named(tmp_path: Path) -> None:
+    """Of a plate with a foot under its end, the last setting needs another distance."""
+    plate = Manifold.cube((600.0, 110.0, 50.0)) + Manifold.cube((40.0, 110.0, 90.0)).translate(
+        (0.0, 0.0, -40.0)
+    )
+    part = tmp_path / "plate.stl"
+    part_of(plate)[1].export(part)
+
+    def of_plate(known: Sequence[Surface]) -> list[str]:
+        return [min(known, key=lambda one: abs(one.keys["faces"][0]["at_mm"][1])).name]
+
+    made = propose(part, Wanted("mm", alloy="2024-T351"), of_plate)
+    assert made.strips is not None
+    said = unlike_settings(made, made.strips)
+    assert said.startswith(f"SETTINGS 1 of {made.settings} need")
 
 
 def test_a_crank_pin_gets_a_chamber_between_its_webs(tmp_path: Path) -> None:
