@@ -358,7 +358,9 @@ def _proposed(
                 words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {why_so}"}
                 if turning is not None:
                     words["part.rotate_deg"] = why_so
-                    words["effects.part_turn"] = f"TURNED BY A DRIVE, at {RPM:g} rpm"
+                    words["effects.part_turn"] = (
+                        f"TURNED BY A DRIVE, at {RPM:g} rpm: its shaft is sealed in the wall"
+                    )
                 why = {**reasons, **words, **_floor_reasons(floor, goes_out, diameter)}
                 made = checked(own, why, floor, known, mesh, wanted.shop)
             except UnreadableError:

@@ -131,7 +131,7 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
     expected = (
         f"about {rounded(dents * gauge, 2)} dents in a window by a pilot; {needed:.0f} would do"
     )
-    few = f"; TOO FEW DENTS within {MINUTES:g} minutes on two cores; give more"
+    few = f"; TOO FEW DENTS are simulated in {MINUTES:g} minutes of two cores: simulate longer"
     wider = f"wider than the usual 1 mm²: enough dents within {MINUTES:g} minutes on two cores"
     reasons = {
         "process.treatment_time_s": _said_of_treatment(found, treatment, coverage_percent),

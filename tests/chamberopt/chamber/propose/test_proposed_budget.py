@@ -55,7 +55,10 @@ def test_windows_widen_where_the_time_would_be_too_long_and_it_is_said() -> None
 def test_what_does_not_resolve_in_the_time_is_said() -> None:
     budget = propose_budget(PILOT._replace(collision_rate=1e8))
     assert budget.gauge_mm2 == pytest.approx(1e6 * WIDEST * PILOT.target)
-    assert "TOO FEW DENTS within 6 minutes on two cores; give more" in budget.reasons[TIME]
+    assert (
+        "TOO FEW DENTS are simulated in 6 minutes of two cores: simulate longer"
+        in budget.reasons[TIME]
+    )
 
 
 def test_the_treatment_time_is_rounded_up_and_says_what_it_rests_on() -> None:
