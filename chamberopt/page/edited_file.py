@@ -315,7 +315,7 @@ def _keep_matters_true(document: Any, changes: Changes) -> None:
     changed = [".".join(name.split(".")[:2]) for name in sorted(changes) if OF_MATTERS.match(name)]
     names += [key_in_words(name) for name in changed]
     if found:
-        matters.remove(found[0])
+        del matters[matters.index(found[0])]
     if names and len(matters):
         matters.insert(0, f"{SINCE}{', '.join(dict.fromkeys(names))}{ADVICE}")
 

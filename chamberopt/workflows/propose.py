@@ -44,7 +44,7 @@ from chamberopt.chamber.propose.quicker import Way, propose_quicker, turns
 from chamberopt.chamber.propose.text import design_text, study_texts
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import local_executor
-from chamberopt.common.files import claim_folder, whole_or_nothing, write_text
+from chamberopt.common.files import claim_folder, remove_file, whole_or_nothing, write_text
 from chamberopt.common.progress import no_steps
 from chamberopt.common.toml_fields import allowed_range
 from chamberopt.design.intensity import WantedIntensity
@@ -199,7 +199,7 @@ def _written(first: Proposal, pilots: _Pilots, folder: Path) -> Proposed:
     made = pilots.improve(first) if pilots.wishes.pilot else first
     pilots.begin(WRITING)
     if made.chamber is not first.chamber:
-        (folder / PICTURE).unlink(missing_ok=True)  # of the first proposal
+        remove_file(folder / PICTURE)  # of the first proposal
         told = draw_target(made.design, made.chamber, folder / PICTURE)
         if not (folder / PICTURE).is_file():
             teller.tell(told)

@@ -224,7 +224,8 @@ def test_what_faces_away_is_offered_for_leaving_out(
     target, area = propose_target(mesh, known, []), areas(mesh.vertices, mesh.triangles)
     heels, toes = (next(o.triangles for o in known if o.name == f"face {k}") for k in (7, 9))
     share = np.where(toes, 0.5, 1.0)
-    monkeypatch.setattr("chamberopt.chamber.propose.proposal.touched", lambda *_: share)
+    for room in ("proposal", "proposed_mask"):
+        monkeypatch.setattr(f"chamberopt.chamber.propose.{room}.touched", lambda *_: share)
     part = SimpleNamespace(target=Target(**target.keys), rotate_deg=(0.0, 0.0, 0.0))
     posed = SimpleNamespace(
         vertices=mesh.vertices, triangles=mesh.triangles, target=target.triangles, area=area
@@ -237,6 +238,7 @@ def test_what_faces_away_is_offered_for_leaving_out(
         tables={"part": {"mesh": str(tmp_path / "gear.obj")}, "part.target": target.keys},
         reasons={},
         trials=(),
+        strips=None,
     )
     away, hidden, sharp = find_left_out(made)
     assert sharp.text.startswith("SHARP EDGES")
