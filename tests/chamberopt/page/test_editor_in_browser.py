@@ -528,9 +528,9 @@ def test_what_is_settled_is_taken_out_of_the_file(opened: Page) -> None:
     expect(listed).to_contain_text("Not masked: ask")
     opened.saved()
     assert file.read_text() == f'to_settle = [\n  "NOT MASKED: ask",\n]\n{text}'
-    file.write_text(f'# proposed by `chamberopt new`\nto_settle = ["NOT MASKED: ask"]\n{text}')
+    file.write_text(f'# proposed by `chamberopt new`\nto_settle = ["LONG: ask"]\n{text}')
     page.click("#reload")
-    expect(page.locator("#settle")).to_contain_text("Not masked", timeout=WAIT)
+    expect(listed).to_contain_text("Long: ask", timeout=WAIT)
     expect(page.locator("#settle .warning")).to_have_count(0)
     opened.put("shot.diameter_mm", 2.5)
     expect(page.locator("#settle .warning")).to_contain_text("you changed some of it")
