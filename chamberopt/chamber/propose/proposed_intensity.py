@@ -317,6 +317,10 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
         expected = f"expected {_with_strip(predicted)}"
     usual = usual_intensity(metal, thickness)
     beside = f"NO USUAL INTENSITY: {why_none(metal, thickness)}"
+    now, least = setting_of(made), min(amplitudes_of(made.sonotrode)[1])
+    if predicted is not None and 1e3 * thickness < THIN_MM and least < now.amplitude_um:
+        weakest = expected_intensity(now._replace(amplitude_um=least), {now: predicted.value})
+        beside += f"; at {least:g} µm, the least, about {plain(weakest, 2)} mmA, more slowly"
     if usual is not None:
         beside = f"{usual.low:g}-{usual.high:g}A are {usual.text}; to aim at it: --intensity usual"
         if predicted is not None and usual.off(predicted.value):

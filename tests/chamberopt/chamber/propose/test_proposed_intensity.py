@@ -384,6 +384,10 @@ def test_thin_places_are_told_of_every_metal(tmp_path: Path, shop: Shop, metal: 
         made = with_thin_places(propose(path, Wanted("mm", shop=shop, alloy=metal), lambda _: []))
         told = made.reasons["shot.diameter_mm"]
         assert ("THIN PLACES: 5% of the target has 1.5 mm of metal or less" in told) is is_thin
+        # The least amplitude of the sonotrode is half of the proposed one.
+        strong = with_expected_intensity(made, PredictedIntensity(0.1, 0.02, 0.5, 2.5))
+        said = f"; at 20 µm, the least, about {0.1 * 0.5**AMPLITUDE_POWER:.2g} mmA, more slowly"
+        assert (said in strong.reasons[INTENSITY]) is is_thin
 
 
 def test_where_a_quarter_is_too_thin_no_intensity_is_usual(tmp_path: Path, shop: Shop) -> None:
