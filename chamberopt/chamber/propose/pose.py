@@ -36,6 +36,7 @@ OF_STEP = {15.0: 0.02, 5.0: 0.01}
 # What a long part may lose by hanging, where no sonotrode is large enough for it lying.
 HANGING = 0.15
 SIDED = 0.01  # mean cosine over a target from which on it looks to one side
+ALIKE = 0.1  # standard deviation of the exposure up to which all of a target is exposed alike
 LOW = 0.05  # advantage of a target at the part's lower end over a target at its upper end
 FLAT = 0.999  # length of the mean unit normal of a target that counts as flat
 LEVEL_DEG = 0.5  # a flat face is level if it is tilted by less
@@ -68,7 +69,7 @@ def propose_pose(
     facing = float(weight @ (normal @ down))
     if facing > 0.5:
         reason = "the target faces the sonotrode"
-    elif facing > 0.1:
+    elif facing > 0.1 or _evenness(weight, normal, down) < 0.5 * (1.0 + facing) - ALIKE:
         reason = "the target's sides are as evenly exposed as they can be"
     else:
         reason = "the target stands upright, so that all its sides are exposed alike"
