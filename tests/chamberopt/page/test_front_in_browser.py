@@ -3,10 +3,11 @@
 import re
 from pathlib import Path
 
+import trimesh
+
 from tests.chamberopt.page.browser_page import Page
 from tests.chamberopt.page.conftest import Served
 from tests.helpers.results.browser import chromium, expect, needs_chromium
-from tests.hunt.meshes import ROOT
 
 pytestmark = needs_chromium
 # Where the corner at x = 1 of a marked surface is drawn after the surface was turned and moved.
@@ -118,14 +119,22 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
 
 def test_a_proposal_takes_the_place_of_what_was_seen_of_the_part(tmp_path: Path) -> None:
     """The ticked name is lit no more, and a distance is not measured from a place on the part."""
-    (tmp_path / "fir_tree.step").write_bytes((ROOT / "designs/parts/fir_tree.step").read_bytes())
-    served = Served(tmp_path, "fir_tree.step")
+    body = trimesh.creation.box((30.0, 20.0, 10.0))
+    lines = [f"v {x} {y} {z}" for x, y, z in body.vertices]
+    looks_down = body.face_normals[:, 2] < -0.5
+    for name, own in (("REST", ~looks_down), ("FACE", looks_down)):
+        rows = body.faces[own] + 1
+        lines += [f"g {name}", *(f"f {a} {b} {c}" for a, b, c in rows)]
+    (tmp_path / "block.obj").write_text("\n".join(lines) + "\n")
+    served = Served(tmp_path, "block.obj")
     try:
         with chromium() as browser:
             opened = Page(browser, served)
             page = opened.page
-            opened.wait("data-drawn='fir_tree.step'")
-            page.check("#names input[value=FIR_TREE]")
+            opened.wait("data-drawn='block.obj'")
+            page.click("#sizes button >> text=in mm)")
+            opened.wait("data-known=all")
+            page.check("#names input[value=FACE]")
             view = page.locator("#view")
             expect(view).to_have_attribute("data-highlight", re.compile(r"\d+"))
             page.click(".tools >> text=Measure")
@@ -148,7 +157,7 @@ def test_a_proposal_takes_the_place_of_what_was_seen_of_the_part(tmp_path: Path)
             expect(told).to_contain_text("click two points")
             page.reload()
             opened.wait("data-chamber=proposal")
-            expect(page.locator("#names input[value=FIR_TREE]")).to_be_checked()
+            expect(page.locator("#names input[value=FACE]")).to_be_checked()
             assert not opened.errors
     finally:
         served.process.kill()
