@@ -43,7 +43,7 @@ from chamberopt.documents.wording import metric_label, value_text
 from chamberopt.page.answers import packed, part_answer, shape_answer, step_texts, surface_answer
 from chamberopt.page.checker import Checker
 from chamberopt.page.duration import duration_in_words
-from chamberopt.page.edited_file import EditedFile, custom_shape, design_fields
+from chamberopt.page.edited_file import OF_MATTERS, EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
 from chamberopt.page.page_words import (
     CHOICES,
@@ -328,6 +328,7 @@ class Acts:
             **_told_of(file),
             "chosen": {name: _chosen(design, name) for name in picked_surfaces(design)},
             "is_proposed": file.is_proposed,
+            "of_matters": OF_MATTERS,
             "is_drawn": design.chamber.setup() is not None,
             "files": _files_beside(file.path),
             "aims": [(name, AIMS[name]) for name in _aims(design)],

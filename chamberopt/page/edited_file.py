@@ -47,8 +47,8 @@ FACETS, ACCURACY = "chamber.facets", "process.accuracy"  # a number, and where i
 PROPOSED = "proposed by `chamberopt new`"
 CHANGED = "changed by you; proposed was "  # and the value, before the reason behind that
 TO_SETTLE = "to_settle"  # from which the page takes out what is settled
-# What is to be settled of a proposal is told of these; a matter says which of them were changed.
-OF_MATTERS = re.compile(r"(part|chamber|sonotrode|shot|holder|mask|materials)\.")
+# Tables that what is to be settled of a proposal is told of; a matter says which were changed.
+OF_MATTERS = "part", "chamber", "sonotrode", "shot", "holder", "mask", "materials"
 SINCE, ADVICE = "CHANGED SINCE IT WAS PROPOSED: ", "; settle what else is listed if it still holds"
 # Keys that the page changes beside its fields: zones, and the faces of target, zone or fixture.
 PICKED = re.compile(
@@ -312,8 +312,8 @@ def _keep_matters_true(document: Any, changes: Changes) -> None:
     matters = document.get(TO_SETTLE, [])
     found = [one for one in matters if one.startswith(SINCE)]
     names = found[0][len(SINCE) : -len(ADVICE)].split(", ") if found else []
-    changed = [".".join(name.split(".")[:2]) for name in sorted(changes) if OF_MATTERS.match(name)]
-    names += [key_in_words(name) for name in changed]
+    changed = (name.split(".")[:2] for name in sorted(changes))
+    names += [key_in_words(".".join(steps)) for steps in changed if steps[0] in OF_MATTERS]
     if found:
         del matters[matters.index(found[0])]
     if names and len(matters):

@@ -46,9 +46,11 @@ LENGTHS = ("height_mm", "sonotrode_distance_mm")
 PEAK_TO_VALLEY_UM = USUAL["amplitude_pv_um"]
 OF_AMPLITUDE = {"amplitude_um": 0.5 * PEAK_TO_VALLEY_UM, "amplitude_pv_um": PEAK_TO_VALLEY_UM}
 OF_LENGTHS = "heights: ISO 2768-m; amplitude: SAE AMS 2580A; what they cost: simulate --tolerances"
-# Warnings of fillets, slots and gaps that are too narrow, and of what no ball touches.
-NOT_SERVED = re.compile(r"^shot of |^[\d.]+% of |no ball gets in there")
-CAN_JAM = re.compile(r"^balls of [\d.]+ mm can jam in ")  # warnings of which the gaps are counted
+# Warnings of fillets, slots and gaps that are too narrow, and of what no ball touches, which counts
+# in what balls serve; and of gaps that jam balls, which are counted.
+COUNTED = re.compile(
+    r"^shot of |^[\d.]+% of |no ball gets in there|^balls of [\d.]+ mm can jam in "
+)
 Tables = dict[str, dict[str, Any]]
 """Tables of a design file by dotted name, as TOML values."""
 
@@ -225,8 +227,7 @@ def new_harm(made: Proposal, before: Proposal) -> str:
     """
     known = {beginning(text) for text in before.warnings}
     of_steps = (re.sub(r"^step \w+: ", "", text) for text in made.warnings)
-    told = (text for text in of_steps if not CAN_JAM.match(text))
-    harms = (beginning(text) for text in told if not NOT_SERVED.search(text))
+    harms = (beginning(text) for text in of_steps if not COUNTED.search(text))
     new = [text for text in harms if text not in known]
     jams = "balls jam in a gap" if len(made.jams) > len(before.jams) else ""
     return next(iter(new), jams)

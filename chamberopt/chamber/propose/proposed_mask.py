@@ -218,7 +218,7 @@ def unlike_settings(proposal: Proposal, strips: Strips) -> str:
     """
     design, why = proposal.design, {}
     proposed = _rooms(proposal.chamber)
-    for number in range(strips.settings):
+    for number in (k for k in range(strips.settings) if k != strips.chosen):
         by_mm = 1e3 * (strips.chosen - number) * strips.pitch
         moved: dict[str, Any] = {"part.target.box_mm": strips.box_mm(proposal.mesh, number)}
         places = {"part": design.part.model_dump(mode="json")}

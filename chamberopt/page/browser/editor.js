@@ -118,9 +118,6 @@ function refuse(error) {
   sayAtFields(error?.at);
 }
 
-// What is to be settled is told of these values.
-const OF_MATTERS = /^(part|chamber|sonotrode|shot|holder|mask|materials)\./;
-
 // What is to be settled before the chamber is built, each until a click says that it is.
 function fillSettle() {
   const open = state.changes.to_settle ?? state.file.to_settle.map((one) => one.text);
@@ -137,7 +134,7 @@ function fillSettle() {
     return element("li", {}, element("span", {}, element("b", { textContent: one.mark }), ...words), ...takes, done);
   });
   const list = element("ol", {}, ...rows), head = element("h2", { textContent: "To be settled before it is built" });
-  const isOld = state.file.is_proposed && Object.keys(state.changes).some((name) => OF_MATTERS.test(name));
+  const isOld = state.file.is_proposed && Object.keys(state.changes).some((name) => state.file.of_matters.includes(name.split(".")[0]));
   const note = isOld ? [element("p", { className: "warning", textContent: "Told of what was proposed, and you changed some of it: settle those that still hold." })] : [];
   find("settle").replaceChildren(...rows.length ? [head, ...note, list] : []);
 }
