@@ -268,8 +268,8 @@ class TurnedSurface:
         self.projections = [_project(corners, mesh, k) for k in range(2)]
 
     def near(self, points: np.ndarray, reach: float) -> np.ndarray:
-        """Return the corners of all triangles within ``reach`` [m] of any of the points (n, 3)."""
-        return np.asarray(self.corners[_near(self.projections[0], self.mesh, points, reach)])
+        """Return the numbers of all triangles near any of the points, as `triangles_near` does."""
+        return _near(self.projections[0], self.mesh, points, reach)
 
     def encloses(self, points: np.ndarray) -> np.ndarray:
         """Return True for points (n, 3) [m] that the triangles enclose.

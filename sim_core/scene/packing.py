@@ -103,7 +103,8 @@ def _free_selector(
     surface = TurnedSurface(mesh, turned_corners(mesh, part_rotation))
 
     def free_of_turned(points: np.ndarray, reach: float) -> np.ndarray:
-        points = points[clearance(surface.near(points, reach), points, reach) >= reach]
+        near = surface.corners[surface.near(points, reach)]
+        points = points[clearance(near, points, reach) >= reach]
         return np.asarray(points[surface.encloses(points)])
 
     return free_of_turned

@@ -24,6 +24,7 @@ from sim_core.numerics.computed_once import computed_once
 from sim_core.scene.analytic_scene import require_clear, require_supported
 from sim_core.scene.bent_faces import require_profiles
 from sim_core.scene.invariants import (
+    TurnedSurface,
     beneath_mean_plane,
     clearance,
     contained,
@@ -213,8 +214,11 @@ class Scene:
                 "it; reverse every triangle of that body so that normals point away from the shot"
             )
         turn = self.physics_at_start.part_rotation
-        corners = None if turn is None else turned_corners(self.mesh, turn)
-        outside = np.flatnonzero(~contained(self.mesh, balls.positions, corners))
+        turned = None if turn is None else TurnedSurface(self.mesh, turned_corners(self.mesh, turn))
+        corners = None if turned is None else turned.corners
+        places = balls.positions
+        inside = contained(self.mesh, places) if turned is None else turned.encloses(places)
+        outside = np.flatnonzero(~inside)
         vibrations, radii = self.physics.vibrations, 0.5 * balls.diameters[outside]
         points = balls.positions[outside]
         outside = outside[~beneath_mean_plane(self.mesh, vibrations, points, radii, corners)]
@@ -224,7 +228,7 @@ class Scene:
                 f"ball {outside[0]} at {where} m is outside the mesh ({len(outside)} in all)"
             )
         # a turning part is at its phase; vibrating faces are checked at theirs below
-        near = self._near(corners)
+        near = self._near(turned)
         still = ~np.isin(near.tags, [one.tag for one in self.physics.vibrations])
         gap = clearance(near.corners[still], balls.positions, balls.radius) - 0.5 * balls.diameters
         worst = int(gap.argmin())
@@ -236,18 +240,18 @@ class Scene:
         self._require_room_above_sonotrode(near)
         self._require_room_between(near)
 
-    def _near(self, corners: np.ndarray | None) -> NearSurface:
+    def _near(self, turned: TurnedSurface | None) -> NearSurface:
         """Return the triangles that may touch balls or come near balls, at their rest positions.
 
         Args:
-            corners: corners of all triangles [m], shape (m, 3, 3), if some triangles are turned.
+            turned: the surface with a turning part at its angle, if there is one.
         """
         assert isinstance(self.mesh, TriangleMesh)
-        reach = self.balls.radius + largest_approach(self.physics)
-        number = np.arange(len(self.mesh.triangles))
-        if corners is None:
-            number = triangles_near(self.mesh, self.balls.positions, reach)
-            corners = self.mesh.corners
+        places, reach = self.balls.positions, self.balls.radius + largest_approach(self.physics)
+        if turned is None:
+            number, corners = triangles_near(self.mesh, places, reach), self.mesh.corners
+        else:
+            number, corners = turned.near(places, reach), turned.corners
         return NearSurface(number, self.mesh.tags[number], corners[number])
 
     def _require_room_above_sonotrode(self, near: NearSurface) -> None:
