@@ -27,6 +27,7 @@ from chamberopt.chamber.checks.jams import (
 )
 from chamberopt.chamber.checks.place_names import (
     CEILING,
+    PART_SIDES,
     SONOTRODE,
     around,
     mm2,
@@ -208,7 +209,7 @@ def _narrow_warning(
     where = f"at {one_of(biggest.centre, biggest.area)} in the chamber's frame"
     balls = "no ball gets" if high < smallest else "only the smaller balls get"
     ball = f"a ball of {1e3 * largest:g} mm"
-    jam = ", or one may be jammed as the part turns" * (turns and "part" in "".join(sides))
+    jam = ", or one may be jammed as the part turns" * (turns and not PART_SIDES.isdisjoint(sides))
     change = _change(set(sides))
     if change in (NEW_SHAPE, CLOSED):
         change += ", or use smaller balls"
@@ -235,13 +236,13 @@ def _change(sides: set[str]) -> str:
     for name in ("holder", "mask"):
         if f"the {name}" in sides:
             return f"change [{name}] or close the gap"
-    if not any("part" in side for side in sides):
+    if not sides & PART_SIDES:
         return NEW_SHAPE
     if SONOTRODE in sides:
         return "raise chamber.sonotrode_distance_mm"
     if CEILING in sides:
         return "raise the ceiling or close the gap"
-    if all("part" in side for side in sides):
+    if sides <= PART_SIDES:
         return CLOSED
     return "enlarge the chamber, check part.offset_mm, or close the gap"
 
