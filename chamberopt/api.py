@@ -136,7 +136,7 @@ def propose(
         first = first_design.propose(path, wanted, lambda _: names)
         given = first, path, wishes, lambda _: names, Path(out)
         done = write_proposal(*given, teller_of(progress), workers)
-    _warn(done.made.warnings)
+    _warn(one.text for one in done.made.warnings)
     return load_design(Path(out) / DESIGN)
 
 

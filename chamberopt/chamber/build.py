@@ -12,11 +12,11 @@ Frame: metres, z up, mean sonotrode face at z = 0, chamber axis at x = y = 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -61,6 +61,8 @@ if TYPE_CHECKING:
     from chamberopt.design.load import Design
     from chamberopt.design.shape_surface import ShapeSurface
     from sim_core import TriangleMesh
+
+T = TypeVar("T", bound=Hashable)
 
 # Rotation of a triangle by rounding [rad] that is worth a note. The facets of a round wall turn a
 # ball's path a hundred times as much.
@@ -181,7 +183,8 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
         steps = [_build_step(name, one, target) for name, one in design.in_steps.items()]
         in_any = np.any([one.part.target for one in steps], axis=0)  # some may reach less of it
         steps = [replace(one, part=replace(one.part, target=in_any)) for one in steps]
-        notes = told_of_steps(dict(zip(names, (one.notes for one in steps), strict=True)))
+        found = found_in_steps(dict(zip(names, (one.notes for one in steps), strict=True)))
+        notes = [f"step {name}: {note}" if name else note for name, note in found]
         chamber = replace(
             steps[0],
             exposed_area=np.max([one.exposed_area for one in steps], axis=0),
@@ -192,19 +195,15 @@ def build_chamber(design: Design, target: np.ndarray | None = None) -> Chamber:
     return chamber.with_notes(_hidden_notes(chamber))
 
 
-def told_of_steps(texts: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return texts on each step, which begin with its name unless they hold for all steps.
+def found_in_steps(found: Mapping[str, Sequence[T]]) -> list[tuple[str, T]]:
+    """Return what was found in steps, each with the step's name, or with "" if all steps have it.
 
     Args:
-        texts: by name of the step.
+        found: by name of the step.
     """
-    of_all = set.intersection(*(set(own) for own in texts.values()))
-    said = (
-        text if text in of_all else f"step {name}: {text}"
-        for name, own in texts.items()
-        for text in own
-    )
-    return list(dict.fromkeys(said))
+    of_all = set.intersection(*(set(own) for own in found.values()))
+    named = (("" if one in of_all else name, one) for name, own in found.items() for one in own)
+    return list(dict.fromkeys(named))
 
 
 def _build_step(name: str, design: Design, target: np.ndarray | None) -> Chamber:

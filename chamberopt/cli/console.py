@@ -87,7 +87,7 @@ def print_warnings(design: Design, chamber: Chamber, which: str = "") -> list[st
     """
     from chamberopt.chamber.checks.check import warnings
 
-    found = warnings(design, chamber)
+    found = [one.text for one in warnings(design, chamber)]
     print_remarks([f"warning{which}: {text}" for text in found])
     return found
 

@@ -13,14 +13,9 @@ import numpy as np
 
 from chamberopt.chamber.bores_and_deflectors import on_deflectors
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.check import (
-    first_warnings,
-    is_of_unpeened,
-    matters,
-    notes,
-    shot_reach,
-)
+from chamberopt.chamber.checks.check import first_warnings, notes, shot_reach
 from chamberopt.chamber.checks.facts import describe, first_facts, with_clearance
+from chamberopt.chamber.checks.warning import UNPEENED, DesignWarning, WarningKind
 from chamberopt.chamber.part import chosen_on_part, chosen_triangles, named_surface, preview_part
 from chamberopt.chamber.propose.proposed_target import (
     Surface,
@@ -166,7 +161,7 @@ def check_answers(design: Design, step: int = 0) -> Iterator[bytes]:
     head: dict[str, Any] = {
         "facts": _facts(design, with_clearance(first_facts(design, whole), mesh)),
         "notes": [on_page(text) for text in notes(design, whole)],
-        **_warnings(design, first_warnings(design, whole, mesh)),
+        **_warnings(first_warnings(design, whole, mesh)),
     }
     part = chamber.part
     chosen = {name: chosen_on_part(one, at, f"{name}.at") for name, at in _fixture_faces(one)}
@@ -184,21 +179,20 @@ def check_answers(design: Design, step: int = 0) -> Iterator[bytes]:
     head = {
         "facts": _facts(design, found),
         "notes": [on_page(text) for text in found["notes"]],
-        **_warnings(design, found["warnings"]),
+        **_warnings(found["warnings"]),
     }
     yield packed(head, state=state)
 
 
-def _warnings(design: Design, texts: Sequence[str]) -> dict[str, list[Words]]:
+def _warnings(found: Sequence[DesignWarning]) -> dict[str, list[Words]]:
     """Return warnings in words: those that the page shows first, and the others.
 
     What is to be settled is not among them: the page has a list of it.
     """
-    known = matters(design)
-    own = [text for text in texts if text not in known]
+    own = [one for one in found if one.kind is not WarningKind.TO_SETTLE]
     return {
-        "unpeened": [on_page(text) for text in own if is_of_unpeened(text)],
-        "warnings": [on_page(text) for text in own if not is_of_unpeened(text)],
+        "unpeened": [on_page(one.text) for one in own if one.kind in UNPEENED],
+        "warnings": [on_page(one.text) for one in own if one.kind not in UNPEENED],
     }
 
 

@@ -245,6 +245,7 @@ class _Run:
         self.timings["simulate"] += simulated - began
         self.timings["coverage"] += time.perf_counter() - simulated
         field, done = target.field, len(replicas)
+        facets = facet_warnings(self.chamber.part, min(design.shot.diameters), field.reach.share)
         growth = growth_for_dents(plan.objective_name, found.resolution)
         unit = unit_of_objective(plan.objective_name, metrics, objective)
         self.step = self.effort.after(done, objective, growth, self.step, unit)
@@ -275,7 +276,7 @@ class _Run:
                 *strength_notes(found.metrics, found.resolution),
                 *zone_notes,
                 *reach_notes(field.reach),
-                *facet_warnings(self.chamber.part, min(design.shot.diameters), field.reach.share),
+                *(one.text for one in facets),
                 *friction_notes(design),
                 *amplitude_notes(design),
                 *edge_notes(design, self.chamber.part, metrics),

@@ -360,7 +360,7 @@ class _Pilots:
             return None
         made = _told(with_amplitude(made, setting), sought.reasons)
         if harm := new_harm(made, now.made):
-            return Compared(made, None, harm)
+            return Compared(made, None, harm.beginning)
         found = self._briefly(made)
         if found is not None and found.intensity:
             found = found._replace(intensity=found.intensity.times(scale))

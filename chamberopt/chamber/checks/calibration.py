@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.design.calibration import NO_STRIPS
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ NOT_COUNTED = (
 )
 
 
-def calibration_warnings(design: Design) -> list[str]:
+def calibration_warnings(design: Design) -> list[DesignWarning]:
     """Return warnings about a design for which its calibration may not hold.
 
     A warning is about values of the design beyond the measured range, friction that was left out
@@ -32,37 +33,40 @@ def calibration_warnings(design: Design) -> list[str]:
     one = design.calibration
     if one is None:
         return []
-    texts = []
+    found: list[tuple[str, str]] = []  # what it is about, and the message
     low, high = one.amplitude_um
     for sonotrode in (design.sonotrode, *design.sonotrodes):
         amplitude = sonotrode.zero_to_peak_um
         if not (2.0 - AMPLITUDE_RANGE) * low <= amplitude <= AMPLITUDE_RANGE * high:
-            texts.append(
+            text = (
                 f"calibration: made at amplitudes of {low:g} to {high:g} µm zero-to-peak, more "
                 f"than 30 % from this design's {amplitude:g}: measure strips at that amplitude too"
             )
+            found.append(("amplitude", text))
     small, large = one.ball_diameter_mm
     for diameter, _ in design.shot.sizes:
         size = 1e3 * diameter
         if not small / DIAMETER_RANGE <= size <= large * DIAMETER_RANGE:
-            texts.append(
+            text = (
                 f"calibration: made with balls of {small:g} to {large:g} mm, and this design's of "
                 f"{size:g} mm differ by more than a factor of 1.5: calibrate with such balls"
             )
+            found.append(("diameter", text))
     density, ratio = design.shot.density, design.shot.density / one.ball_density_kg_m3
     if max(ratio, 1.0 / ratio) > DENSITY_RANGE:
-        texts.append(
+        text = (
             f"calibration: made with balls of {one.ball_density_kg_m3:g} kg/m³, this design's have "
             f"{density:g}: another material has other constants; calibrate with this shot"
         )
+        found.append(("density", text))
     if ("mu" in one.parameters) != (design.effects.friction is not None):
-        texts.append(COUNTED_TWICE if design.effects.friction else NOT_COUNTED)
-    texts += misfit_texts(one)
+        found.append(("friction", COUNTED_TWICE if design.effects.friction else NOT_COUNTED))
+    found += [("misfit", text) for text in misfit_texts(one)]
     if one.not_mmA:
-        texts.append(one.not_mmA)
+        found.append(("strips", one.not_mmA))
     if not one.has_strips:
-        texts.append(f"calibration: {NO_STRIPS}")
-    return texts
+        found.append(("strips", f"calibration: {NO_STRIPS}"))
+    return [DesignWarning(WarningKind.CALIBRATION, text, (about,)) for about, text in found]
 
 
 def misfit_texts(calibration: Calibration) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,15 +12,14 @@ from chamberopt.chamber.build import (
     NOTED_HIDDEN,
     TARGET,
     floor_sides_mm,
+    found_in_steps,
     hidden_share,
     selection_of,
-    told_of_steps,
 )
 from chamberopt.chamber.checks.calibration import calibration_warnings
 from chamberopt.chamber.checks.fillets import facet_warnings, fillet_warnings
 from chamberopt.chamber.checks.gaps import (
     MIN_MISSED_SHARE,
-    UNTOUCHED,
     find_ledges,
     gap_warnings,
     gutter_warnings,
@@ -27,6 +27,7 @@ from chamberopt.chamber.checks.gaps import (
     surface_warnings,
 )
 from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, mm2, surface_names
+from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.dimensionless import free_path
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.reach import Reach, find_reach, reached_part_share
@@ -49,7 +50,6 @@ if TYPE_CHECKING:
 # finds no places to start from.
 MAX_PACKING_FRACTION = 0.2
 MIN_AMPLITUDES = 10.0  # between part and sonotrode, as for sonotrode_distance_mm of a design
-HIDDEN = "is outside the chamber and counts as not covered"
 MAX_HIDDEN_SHARE = 0.05  # of the target's area; a larger share means a misplaced ceiling or wall
 DOWN = 0.9  # cosine to the way down from which on a face that was level looks at the sonotrode
 MIN_MASKED = 1e-4  # share of the target under a mask that is worth a warning
@@ -88,7 +88,7 @@ def touched(design: Design, chamber: Chamber) -> np.ndarray:
     return np.asarray(np.max(each, axis=0))
 
 
-def warnings(design: Design, chamber: Chamber) -> list[str]:
+def warnings(design: Design, chamber: Chamber) -> list[DesignWarning]:
     """Return warnings about values that are allowed but probably not intended, with remedies.
 
     What stops or harms the process comes first, then what is not peened, then what makes figures
@@ -97,18 +97,18 @@ def warnings(design: Design, chamber: Chamber) -> list[str]:
     if chamber.steps:
         return _step_warnings(design, chamber)
     reach = shot_reach(design, chamber)
-    texts = _wall_warnings(design, chamber, reach) + first_warnings(design, chamber, reach.mesh)
+    found = _wall_warnings(design, chamber, reach) + first_warnings(design, chamber, reach.mesh)
     for name, surface in _to_be_peened(design, chamber).items():
-        texts += surface_warnings(reach, surface, name, design.part.target.reachable)
-    texts += fillet_warnings(reach, chamber, max(design.shot.diameters))
-    return texts + facet_warnings(
+        found += surface_warnings(reach, surface, name, design.part.target.reachable)
+    found += fillet_warnings(reach, chamber, max(design.shot.diameters))
+    return found + facet_warnings(
         chamber.part, reach.diameter, reached_share(reach, chamber.on_target)
     )
 
 
 def _wall_warnings(
     design: Design, chamber: Chamber, reach: Reach, turned_down: np.ndarray | None = None
-) -> list[str]:
+) -> list[DesignWarning]:
     """Return warnings about gaps, pockets and gutters, from where the shot reaches.
 
     Args:
@@ -120,12 +120,7 @@ def _wall_warnings(
     return [*gaps, *pocket_warnings(reach, chamber), *gutters]
 
 
-def is_of_unpeened(warning: str) -> bool:
-    """Return True for a warning that some of the target or of a zone is not peened at all."""
-    return HIDDEN in warning or UNTOUCHED in warning
-
-
-def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
+def _step_warnings(design: Design, chamber: Chamber) -> list[DesignWarning]:
     """Return the warnings of each step, and one on what no ball can touch in any of them.
 
     Of narrow fillets and slots only the steps with the finest balls warn, as these get there.
@@ -142,24 +137,25 @@ def _step_warnings(design: Design, chamber: Chamber) -> list[str]:
         balls.add(f"{1e3 * reach.diameter:g}")
         turned_down = down.sum(axis=0) > now  # what looks down in another step
         first = first_warnings(one, room, reach.mesh, False, turned_down)
-        texts = [*_wall_warnings(one, room, reach, turned_down), *first]
+        found[name] = [*_wall_warnings(one, room, reach, turned_down), *first]
         if max(one.shot.diameters) == finest:
-            texts += fillet_warnings(reach, room, finest)
+            found[name] += fillet_warnings(reach, room, finest)
         share = reached_share(reach, room.on_target)
-        found[name] = [*texts, *facet_warnings(room.part, reach.diameter, share)]
-    texts = told_of_steps(found)
+        found[name] += facet_warnings(room.part, reach.diameter, share)
+    told = [replace(warning, step=name) for name, warning in found_in_steps(found)]
     spared = {one.name for one in design.zones if one.is_spared}
     wanted = {TARGET: part.target}
     wanted |= {f"zone {name}": one for name, one in part.zones.items() if name not in spared}
     for name, rows in wanted.items():
         left, whole = float((part.area - shares)[rows].sum()), float(part.area[rows].sum())
         if left > MIN_MISSED_SHARE * whole and not design.part.target.reachable:
-            texts.append(
-                f"{left / whole:.1%} of {name} ({mm2(left)}) {UNTOUCHED} "
+            text = (
+                f"{left / whole:.1%} of {name} ({mm2(left)}) cannot be touched by a ball of "
                 f"{' or '.join(sorted(balls))} mm in any step, however long it is peened: add a "
                 f"step in another pose, or narrow {selection_of(name)}"
             )
-    return texts
+            told.append(DesignWarning(WarningKind.UNTOUCHED, text, (name,)))
+    return told
 
 
 def first_warnings(
@@ -168,7 +164,7 @@ def first_warnings(
     mesh: TriangleMesh,
     of_surfaces: bool = True,
     turned_down: np.ndarray | None = None,
-) -> list[str]:
+) -> list[DesignWarning]:
     """Return the warnings that do not depend on where the shot reaches the surface.
 
     Args:
@@ -178,48 +174,58 @@ def first_warnings(
         turned_down: as of `find_ledges`.
     """
     shot = design.shot
-    texts = _sonotrode_warnings(design, mesh, turning_axis(design, chamber.part))
-    texts += _block_warnings(design, chamber)
+    found = _sonotrode_warnings(design, mesh, turning_axis(design, chamber.part))
+    found += _block_warnings(design, chamber)
     filled = shot.volume / chamber.volume
     if filled > MAX_PACKING_FRACTION:
-        texts.append(
+        text = (
             f"the balls fill {filled:.0%} of the free volume; above {MAX_PACKING_FRACTION:.0%} "
             "they hinder each other: lower shot.mass_g or enlarge the chamber"
         )
+        found.append(DesignWarning(WarningKind.PACKING, text))
     for name, surface in _to_be_peened(design, chamber).items() if of_surfaces else ():
         if (hidden := hidden_share(surface)) > MAX_HIDDEN_SHARE:
-            texts.append(
-                f"{hidden:.0%} of the area of {name} {HIDDEN}: enlarge the chamber, or narrow "
-                f"{selection_of(name)} to what is to be peened"
+            text = (
+                f"{hidden:.0%} of the area of {name} is outside the chamber and counts as not "
+                f"covered: enlarge the chamber, or narrow {selection_of(name)} to what is to be "
+                "peened"
             )
-    texts += _mask_warnings(chamber)
-    texts += _side_wall_warnings(design, chamber)
-    texts += [one.message for one in find_ledges(design, chamber, turned_down) if one.level]
+            found.append(DesignWarning(WarningKind.HIDDEN, text, (name,)))
+    found += _mask_warnings(chamber)
+    found += _side_wall_warnings(design, chamber)
+    found += [
+        DesignWarning(WarningKind.REST, one.message, (one.name,))
+        for one in find_ledges(design, chamber, turned_down)
+        if one.level
+    ]
     path = free_path(design, chamber)
     if not design.effects.ball_collisions and path < MIN_FREE_PATH:
-        texts.append(
+        text = (
             f"effects.ball_collisions is false, though a ball would meet another every "
             f"{plain(path, 2)} chamber heights: they fly through each other; switch it on"
         )
+        found.append(DesignWarning(WarningKind.COLLISIONS, text))
     turn = design.effects.part_turn
     recorded = design.process.accuracy.replicas * design.process.recorded_time
     if turn is not None and turn.rpm != 0.0 and recorded < turn.period:
-        texts.append(
+        text = (
             f"the part takes {plain(turn.period, 3)} s to turn once, but the replicas together "
             f"last only {plain(recorded, 3)} s: coverage is that of some of its positions; raise "
             "process.accuracy.simulated_time_s or replicas"
         )
+        found.append(DesignWarning(WarningKind.PART_TURN, text))
     if abs(shot.count * shot.ball_mass - shot.mass) > 0.05 * shot.mass:
-        texts.append(
+        text = (
             f"shot.mass_g = {shot.mass_g:g} is rounded to {shot.count} whole ball(s) of "
             f"{shot.ball_mass * 1e6:.3g} mg: the charge differs by more than 5 %"
         )
-    texts += calibration_warnings(design)
-    return texts + matters(design)
+        found.append(DesignWarning(WarningKind.CHARGE, text))
+    found += calibration_warnings(design)
+    return found + [DesignWarning(WarningKind.TO_SETTLE, text) for text in matters(design)]
 
 
 def matters(design: Design) -> list[str]:
-    """Return a warning of each matter that is to be settled before the chamber is built."""
+    """Return the text of a warning of each matter to be settled before the chamber is built."""
     return [f"to be settled: {one_line(text)}" for text in design.to_settle]
 
 
@@ -286,20 +292,21 @@ def reached_share(reach: Reach, rows: np.ndarray) -> float:
     return float(reach.share[rows] @ size / size.sum())
 
 
-def _mask_warnings(chamber: Chamber) -> list[str]:
+def _mask_warnings(chamber: Chamber) -> list[DesignWarning]:
     """Return a warning if the mask covers some of the target, else an empty list."""
     mask, part = chamber.fixtures.get("mask"), chamber.part
     whole = float(part.area[part.target].sum())
     if mask is None or mask.covered_target < MIN_MASKED * whole:
         return []
-    return [
+    text = (
         f"the mask covers {mask.covered_target / whole:.1%} of the target "
         f"({mm2(mask.covered_target)}), which counts as not covered: leave these faces out of "
         "[part.target], or mask fewer faces"
-    ]
+    )
+    return [DesignWarning(WarningKind.MASK, text)]
 
 
-def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
+def _side_wall_warnings(design: Design, chamber: Chamber) -> list[DesignWarning]:
     """Return a warning if the part goes out through the side wall, else an empty list.
 
     There is no warning for a part whose whole target is in the chamber, that closes the chamber
@@ -321,14 +328,17 @@ def _side_wall_warnings(design: Design, chamber: Chamber) -> list[str]:
     # The height does not move a side wall. A user's own shape has keys of its own.
     keys = [key for key in design.chamber.widths_mm() if key != "height_mm"]
     named = f" ({', '.join(f'chamber.{key}' for key in keys)})" if keys else ""
-    return [
+    text = (
         f"the part goes out through the side wall between z = {height.min():.4g} and "
         f"{height.max():.4g} mm: what is outside is not peened; enlarge the chamber"
         f"{named}, or check part.offset_mm"
-    ]
+    )
+    return [DesignWarning(WarningKind.SIDE_WALL, text)]
 
 
-def _sonotrode_warnings(design: Design, mesh: TriangleMesh, line: Axis | None) -> list[str]:
+def _sonotrode_warnings(
+    design: Design, mesh: TriangleMesh, line: Axis | None
+) -> list[DesignWarning]:
     """Return a warning if the sonotrode may hit the part, or a ball may be jammed between them.
 
     Args:
@@ -338,23 +348,25 @@ def _sonotrode_warnings(design: Design, mesh: TriangleMesh, line: Axis | None) -
     remedy = "raise chamber.sonotrode_distance_mm"
     clear, turn = sonotrode_clearance(mesh), design.effects.part_turn
     if clear < MIN_AMPLITUDES * amplitude:
-        return [
+        text = (
             f"part and sonotrode are only {1e3 * clear:.3g} mm apart, less than ten amplitudes of "
             f"{1e6 * amplitude:g} µm: they may hit each other; {remedy}"
-        ]
+        )
+        return [DesignWarning(WarningKind.CONTACT, text)]
     if turn is None or line is None:
         return []
     own = mesh.vertices[mesh.triangles[mesh.tags == TAG_PART]].reshape(-1, 3)
     below = _lowest_height(line, own, turn.amplitude) - amplitude
     if not 0.0 < below < ball:
         return []
-    return [
+    text = (
         f"the gap between turning part and sonotrode is {below * 1e3:.3g} mm, narrower than a ball "
         f"of {ball * 1e3:g} mm: a ball may be jammed there as the part turns; {remedy}"
-    ]
+    )
+    return [DesignWarning(WarningKind.TURNING_GAP, text)]
 
 
-def _block_warnings(design: Design, chamber: Chamber) -> list[str]:
+def _block_warnings(design: Design, chamber: Chamber) -> list[DesignWarning]:
     """Return a warning if the floor is so small that fewer of its blocks carry it.
 
     A floor that is a part of one sonotrode is usual.
@@ -367,12 +379,13 @@ def _block_warnings(design: Design, chamber: Chamber) -> list[str]:
     if columns * rows >= blocks.count:
         return []
     (x, y), (long, wide) = sides, blocks.sides_mm
-    return [
+    text = (
         f"the sonotrodes are wider than the floor: {blocks.in_words}, together {long:g} × {wide:g} "
         f"mm, and the floor is {x:.4g} × {y:.4g} mm, so that walls stand over their faces; set "
         f"sonotrode.face.columns = {columns} and sonotrode.face.rows = {rows}, or enlarge the "
         "chamber"
-    ]
+    )
+    return [DesignWarning(WarningKind.NARROW_FLOOR, text)]
 
 
 def sonotrode_clearance(mesh: TriangleMesh) -> float:

@@ -34,7 +34,9 @@ Facts = dict[str, object]
 
 
 def describe(design: Design, chamber: Chamber) -> dict[str, Any]:
-    """Return facts and warnings about a design and its chamber, as JSON values with named units.
+    """Return facts about a design and its chamber, as JSON values with named units.
+
+    "notes" are sentences, and "warnings" are each a DesignWarning.
 
     Raises:
         InputError: there are too many balls, or the part cannot turn.

@@ -14,6 +14,7 @@ import numpy as np
 
 from chamberopt.chamber.checks.jams import MAX_COSINE
 from chamberopt.chamber.checks.place_names import one_of
+from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.largest_ball import largest_balls
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
 from chamberopt.design.shape_surface import TAG_PART
@@ -32,7 +33,7 @@ def facets_are_left(part: Part) -> bool:
     return part.smoothing is not None and part.smoothing.coarse_share >= LEAST_SHARE
 
 
-def facet_warnings(part: Part, ball: float, reachable: float) -> list[str]:
+def facet_warnings(part: Part, ball: float, reachable: float) -> list[DesignWarning]:
     """Return a warning if the simulated target has coarse facets in place of its curved surface.
 
     Args:
@@ -52,12 +53,13 @@ def facet_warnings(part: Part, ball: float, reachable: float) -> list[str]:
     else:
         why = "which were left as they are"
         remedy = "give a mesh with finer facets, or change part.smoothing"
-    return [
+    text = (
         f"coverage is that of facets: they turn by {np.degrees(facts.coarse_turn):.2g} degrees on "
         f"{facts.coarse_share:.0%} of the target, {why}; in their hollows a ball lies across two "
         f"of them: by facets a ball of {1e3 * ball:g} mm touches {reachable:.1%} of the target, by "
         f"the curvature of its rounds up to {touched_by_curvature(part, ball):.1%}; {remedy}"
-    ]
+    )
+    return [DesignWarning(WarningKind.FACETS, text)]
 
 
 def touched_by_curvature(part: Part, ball: float) -> float:
@@ -82,7 +84,7 @@ SMALLEST = 0.05  # share of the inner edges' length, or the slots' area, that ma
 MAX_POINTS = 5000  # surface points at which slots are searched
 
 
-def fillet_warnings(reach: Reach, chamber: Chamber, largest: float) -> list[str]:
+def fillet_warnings(reach: Reach, chamber: Chamber, largest: float) -> list[DesignWarning]:
     """Return warnings about fillets and slots of target and zones too small for the largest ball.
 
     Args:
@@ -179,7 +181,7 @@ def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.nda
     return across
 
 
-def _fillets(chamber: Chamber, chosen: np.ndarray, largest: float) -> list[str]:
+def _fillets(chamber: Chamber, chosen: np.ndarray, largest: float) -> list[DesignWarning]:
     part = chamber.part
     middle, length, radius, _ = inner_edges(part.vertices, part.triangles, chosen, part.hollow)
     small = radius * OF_FILLET < AS_DRAWN * largest
@@ -188,14 +190,17 @@ def _fillets(chamber: Chamber, chosen: np.ndarray, largest: float) -> list[str]:
     smallest = _low_quantile(radius[small], length[small])
     fillet = f"fillets of about {1e3 * smallest:.2g} mm" if smallest else "inner edges without one"
     where = one_of(middle[small], length[small])
-    return [
+    text = (
         f"shot of {1e3 * largest:g} mm is larger than half the radius of the target's smallest "
         f"fillets ({fillet}, e.g. at {where}): the shot peens them less than what is beside them; "
         "use smaller balls, or give them a zone of their own (docs/how_to/drawing.md)"
-    ]
+    )
+    return [DesignWarning(WarningKind.FILLET, text)]
 
 
-def _slots(reach: Reach, chamber: Chamber, chosen: np.ndarray, largest: float) -> list[str]:
+def _slots(
+    reach: Reach, chamber: Chamber, chosen: np.ndarray, largest: float
+) -> list[DesignWarning]:
     """Return a warning if faces of the part face each other less than four balls apart.
 
     Args:
@@ -217,11 +222,12 @@ def _slots(reach: Reach, chamber: Chamber, chosen: np.ndarray, largest: float) -
         return []
     width = 2.0 * _low_quantile(radius[facing], area[facing])
     where = one_of(points[facing], area[facing])
-    return [
+    text = (
         f"shot of {1e3 * largest:g} mm is larger than a quarter of the target's narrowest slot, "
         f"about {1e3 * width:.3g} mm wide, e.g. at {where}: few balls get to its bottom, and "
         "slowly; use smaller balls, or give it a zone of its own (docs/how_to/drawing.md)"
-    ]
+    )
+    return [DesignWarning(WarningKind.SLOT, text)]
 
 
 def _low_quantile(values: np.ndarray, weight: np.ndarray) -> float:

@@ -27,12 +27,15 @@ from chamberopt.chamber.checks.jams import (
 )
 from chamberopt.chamber.checks.place_names import (
     CEILING,
+    PART,
+    PART_SIDES,
     SONOTRODE,
     around,
     mm2,
     one_of,
     surface_names,
 )
+from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.largest_ball import TouchPoints
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
 from chamberopt.common.number_text import percent, plain
@@ -54,7 +57,6 @@ if TYPE_CHECKING:
 
 MAX_WARNINGS = 4  # of one kind
 MIN_MISSED_SHARE = 0.005  # share of the target that is worth a warning
-UNTOUCHED = "cannot be touched by a ball of"
 
 MIN_FREE = 0.1  # ball diameters: smaller balls are no remedy
 NEW_SHAPE, CLOSED = "change the chamber's shape", "close it where it is not to be peened"
@@ -63,7 +65,7 @@ Sides = tuple[str, str]  # the surfaces beside a gap
 
 def gap_warnings(
     reach: Reach, chamber: Chamber, diameters: Sequence[float], turns: bool = False
-) -> list[str]:
+) -> list[DesignWarning]:
     """Return warnings about gaps in which balls jam, and about narrower ones, by size.
 
     Args:
@@ -88,11 +90,11 @@ def gap_warnings(
     ]
 
 
-def pocket_warnings(reach: Reach, chamber: Chamber) -> list[str]:
+def pocket_warnings(reach: Reach, chamber: Chamber) -> list[DesignWarning]:
     """Return warnings about pockets that could hold a ball but let none in, largest areas first."""
     touches, closed = reach.touches, reach.fits & ~reach.reached
     target = chamber.on_target[touches.triangle]
-    found: list[tuple[float, str]] = []
+    found: list[tuple[float, DesignWarning]] = []
     for region in np.unique(reach.region[closed]):
         own = closed & (reach.region == region)
         is_room = region < len(reach.region_volume) and reach.region_volume[region] > 0.0
@@ -105,8 +107,11 @@ def pocket_warnings(reach: Reach, chamber: Chamber) -> list[str]:
                 f"ball of {1e3 * reach.diameter:g} mm but has no way in for one{loss}; widen its "
                 "mouth, close it, or use smaller balls"
             )
-            found.append((float(touches.area[own].sum()), text))
-    return [text for _, text in sorted(found, key=lambda one: -one[0])[:MAX_WARNINGS]]
+            names = np.unique(surface_names(chamber)[touches.triangle[own]])
+            beside = {PART if name in PART_SIDES else name for name in names}
+            one = DesignWarning(WarningKind.POCKET, text, tuple(sorted(beside)))
+            found.append((float(touches.area[own].sum()), one))
+    return [one for _, one in sorted(found, key=lambda each: -each[0])[:MAX_WARNINGS]]
 
 
 def _in_cavity(reach: Reach, places: np.ndarray) -> np.ndarray:
@@ -124,7 +129,7 @@ def _in_cavity(reach: Reach, places: np.ndarray) -> np.ndarray:
 
 def surface_warnings(
     reach: Reach, chamber: Chamber, name: str = TARGET, only_reachable: bool = False
-) -> list[str]:
+) -> list[DesignWarning]:
     """Return a warning if no ball can touch some of the target, however long it is peened.
 
     Args:
@@ -150,14 +155,15 @@ def surface_warnings(
         second_half = np.cumsum(touches.area[own][order]) > 0.5 * left
         diameter_mm = 2e3 * float(touches.radius[own][order][np.argmax(second_half)])
         remedy = f"balls of {diameter_mm:.2g} mm would fit half of that; or {remedy}"
-    return [
-        f"{left / whole:.1%} of {name} in the chamber ({mm2(left)}) {UNTOUCHED} "
-        f"{1e3 * reach.diameter:g} mm, however long it is peened: e.g. at {place} in "
-        f"the chamber's frame; {remedy}"
-    ]
+    text = (
+        f"{left / whole:.1%} of {name} in the chamber ({mm2(left)}) cannot be touched by a "
+        f"ball of {1e3 * reach.diameter:g} mm, however long it is peened: e.g. at {place} in the "
+        f"chamber's frame; {remedy}"
+    )
+    return [DesignWarning(WarningKind.UNTOUCHED, text, (name,))]
 
 
-def _jam_warnings(jams: list[tuple[float, JamGap]]) -> list[str]:
+def _jam_warnings(jams: list[tuple[float, JamGap]]) -> list[DesignWarning]:
     """Return warnings about gaps in which balls jam, one for all between the same two surfaces.
 
     Args:
@@ -170,7 +176,7 @@ def _jam_warnings(jams: list[tuple[float, JamGap]]) -> list[str]:
     return [_jam_warning(diameter, kinds[diameter, sides]) for diameter, sides in first]
 
 
-def _jam_warning(diameter: float, gaps: list[JamGap]) -> str:
+def _jam_warning(diameter: float, gaps: list[JamGap]) -> DesignWarning:
     """Return one warning about all gaps between the same surfaces in which such balls [m] jam."""
     low, high = min(gap.width[0] for gap in gaps), max(gap.width[1] for gap in gaps)
     share = sum(gap.target_share for gap in gaps)
@@ -182,16 +188,18 @@ def _jam_warning(diameter: float, gaps: list[JamGap]) -> str:
     ]
     free = " or ".join(end for end in ends if end)
     remedy = f"use balls {free}, or " if free else ""
-    return (
-        f"balls of {1e3 * diameter:g} mm can jam in {_where(gaps[0].sides, len(gaps))} at "
+    sides = gaps[0].sides
+    text = (
+        f"balls of {1e3 * diameter:g} mm can jam in {_where(sides, len(gaps))} at "
         f"{around(gaps[0].place[None])} in the chamber's frame, {_width(low, high)} wide there"
-        f"{target}; {remedy}{_change(set(gaps[0].sides))}"
+        f"{target}; {remedy}{_change(set(sides))}"
     )
+    return DesignWarning(WarningKind.JAM, text, sides)
 
 
 def _narrow_warning(
     sides: Sides, gaps: list[TouchPoints], smallest: float, largest: float, turns: bool
-) -> str:
+) -> DesignWarning:
     """Return one warning about all narrow gaps between the same two surfaces.
 
     Args:
@@ -208,14 +216,15 @@ def _narrow_warning(
     where = f"at {one_of(biggest.centre, biggest.area)} in the chamber's frame"
     balls = "no ball gets" if high < smallest else "only the smaller balls get"
     ball = f"a ball of {1e3 * largest:g} mm"
-    jam = ", or one may be jammed as the part turns" * (turns and "part" in "".join(sides))
+    jam = ", or one may be jammed as the part turns" * (turns and not PART_SIDES.isdisjoint(sides))
     change = _change(set(sides))
     if change in (NEW_SHAPE, CLOSED):
         change += ", or use smaller balls"
-    return (
+    text = (
         f"{_where(sides, len(gaps))} {where} is {_width(low, high)} wide, narrower than {ball}: "
         f"{balls} in there{jam}; {change}"
     )
+    return DesignWarning(WarningKind.NARROW_GAP, text, sides)
 
 
 def _where(sides: Sides, count: int) -> str:
@@ -235,13 +244,13 @@ def _change(sides: set[str]) -> str:
     for name in ("holder", "mask"):
         if f"the {name}" in sides:
             return f"change [{name}] or close the gap"
-    if not any("part" in side for side in sides):
+    if not sides & PART_SIDES:
         return NEW_SHAPE
     if SONOTRODE in sides:
         return "raise chamber.sonotrode_distance_mm"
     if CEILING in sides:
         return "raise the ceiling or close the gap"
-    if all("part" in side for side in sides):
+    if sides <= PART_SIDES:
         return CLOSED
     return "enlarge the chamber, check part.offset_mm, or close the gap"
 
@@ -261,6 +270,7 @@ REMEDY = {
 class Ledge(NamedTuple):
     """Surfaces of the part or of a wall that face up, so that balls can come to rest on them."""
 
+    name: str  # such as "the part"
     message: str
     level: bool  # true if enough of the surface is level for a ball to lie on
 
@@ -319,7 +329,7 @@ def find_ledges(
             f"at z = {heights}; "
             f"{REMEDY[name].format(key=design.chamber.ceiling_key)}"
         )
-        found.append(Ledge(message, level))
+        found.append(Ledge(f"the {name}", message, level))
     return found
 
 
@@ -330,7 +340,7 @@ GUTTER_BALLS, CARRIED, LEVEL_LINE = 1.3, 0.02, 0.02
 
 def gutter_warnings(
     design: Design, chamber: Chamber, reach: Reach, turned_down: np.ndarray | None = None
-) -> list[str]:
+) -> list[DesignWarning]:
     """Return a warning if balls can come to rest between the part and a wall beside it.
 
     Args:
@@ -359,12 +369,13 @@ def gutter_warnings(
     if length < max(1.0, FEW * shot.count) * shot.diameter:
         return []
     name = surface_names(chamber)[touches.obstacle[rows[0]]]
-    return [
+    text = (
         f"balls can come to rest on the part in the gutter between it and {name}, where both fall "
         f"towards each other: about {plain(1e3 * length, 2)} mm long, one place at "
         f"{one_of(touches.centre[rows], touches.area[rows])} in the chamber's frame; lower the "
         "ceiling to it, turn the part (part.rotate_deg), or move the wall away from its slope"
-    ]
+    )
+    return [DesignWarning(WarningKind.REST, text, (PART, name))]
 
 
 def _in_hollows(chamber: Chamber, upward: np.ndarray, downward: np.ndarray) -> np.ndarray:

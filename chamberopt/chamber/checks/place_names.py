@@ -13,15 +13,17 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
 
 MIN_UPWARD = 0.5  # cosine to the vertical: a surface steeper than 60 degrees is a side
-CEILING, SIDE_WALL, SONOTRODE = "the ceiling", "the wall", "the sonotrode"
+CEILING, SIDE_WALL, SONOTRODE, PART = "the ceiling", "the wall", "the sonotrode", "the part"
+UPPER_SIDE, UNDERSIDE = "the part's upper side", "the part's underside"
+PART_SIDE = "the part's side"
+PART_SIDES = frozenset({UPPER_SIDE, UNDERSIDE, PART_SIDE})
 
 
 def surface_names(chamber: Chamber) -> np.ndarray:
     """Return a name, such as "the ceiling", for the surface that each triangle is on, (k,)."""
     up = -unit_vectors(area_vectors(chamber.vertices, chamber.triangles))[:, 2]
     faces = [up > MIN_UPWARD, up < -MIN_UPWARD]
-    sides = ["the part's upper side", "the part's underside"]
-    on_part = np.select(faces, sides, "the part's side")
+    on_part = np.select(faces, [UPPER_SIDE, UNDERSIDE], PART_SIDE)
     on_wall = np.select(faces, ["a ledge of the wall", CEILING], SIDE_WALL)
     words = np.where(chamber.tags == TAG_PART, on_part, on_wall).astype(object)
     words[chamber.tags == TAG_SONOTRODE] = SONOTRODE

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.chamber.checks.gaps import CLOSED
+from chamberopt.chamber.checks.place_names import PART_SIDES
+from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.propose.held_proposal import (
     clamped_outside,
@@ -371,7 +372,7 @@ def _proposed(
                 continue
             if best is None or faults(made) < faults(best[0]):
                 best = made, floor
-            if not any(_takes_room(text) for text in made.warnings):
+            if not any(map(_takes_room, made.warnings)):
                 break
         if best is None:
             assert refused is not None
@@ -409,12 +410,15 @@ def _proposed(
     return replace(made, reasons={**made.reasons, **_room_reason(made, floor)})
 
 
-def _takes_room(warning: str) -> bool:
-    """Return whether a warning tells of a gap or a gutter that more room beside the part may end.
+def _takes_room(warning: DesignWarning) -> bool:
+    """Return whether a warning tells of what more room beside the part may end.
 
     A gap between two faces of the part is left as it is.
     """
-    return "side wall" in warning or ("gap" in warning and CLOSED not in warning)
+    kind = warning.kind
+    if kind in (WarningKind.JAM, WarningKind.NARROW_GAP):
+        return not PART_SIDES.issuperset(warning.about)
+    return kind in (WarningKind.TURNING_GAP, WarningKind.SIDE_WALL)
 
 
 def _too_large(made: Proposal, stock_mm: Sequence[float]) -> str:

@@ -12,7 +12,8 @@ import numpy as np
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import touched
-from chamberopt.chamber.checks.place_names import one_of
+from chamberopt.chamber.checks.place_names import PART, one_of
+from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.propose.proposal import (
     Proposal,
     Tables,
@@ -200,7 +201,7 @@ def is_firm(made: Proposal) -> bool:
 
 def rests(made: Proposal) -> bool:
     """Return whether balls would come to rest on the part."""
-    return any("come to rest on the part" in text for text in made.warnings)
+    return any(one.kind is WarningKind.REST and PART in one.about for one in made.warnings)
 
 
 def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> Proposal:
@@ -331,7 +332,7 @@ def _harmless(
     if touched_share(before) - touched_share(made) > hidden:
         return None, "a holder would keep the balls from some of the target"
     if harm := new_harm(made, before):
-        return None, f"with the {kind}: {harm}"
+        return None, f"with the {kind}: {harm.beginning}"
     return made, ""
 
 

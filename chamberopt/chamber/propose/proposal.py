@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any, NamedTuple
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import shot_reach, touched, warnings
 from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
+from chamberopt.chamber.checks.warning import UNPEENED, DesignWarning, WarningKind
 from chamberopt.chamber.propose.pose import Pose
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS, SizeFit, charge_of
 from chamberopt.chamber.propose.proposed_end import Strips
@@ -48,9 +48,7 @@ OF_AMPLITUDE = {"amplitude_um": 0.5 * PEAK_TO_VALLEY_UM, "amplitude_pv_um": PEAK
 OF_LENGTHS = "heights: ISO 2768-m; amplitude: SAE AMS 2580A; what they cost: simulate --tolerances"
 # Warnings of fillets, slots and gaps that are too narrow, and of what no ball touches, which counts
 # in what balls serve; and of gaps that jam balls, which are counted.
-COUNTED = re.compile(
-    r"^shot of |^[\d.]+% of |no ball gets in there|^balls of [\d.]+ mm can jam in "
-)
+COUNTED = UNPEENED | {WarningKind.FILLET, WarningKind.SLOT, WarningKind.NARROW_GAP, WarningKind.JAM}
 Tables = dict[str, dict[str, Any]]
 """Tables of a design file by dotted name, as TOML values."""
 
@@ -110,7 +108,7 @@ class Proposal:
     known: tuple[Surface, ...]  # surfaces to choose the target from
     mesh: PartMesh
     chamber: Chamber
-    warnings: tuple[str, ...]
+    warnings: tuple[DesignWarning, ...]
     jams: tuple[JamGap, ...]  # gaps of chamber and part in which the balls jam
     sonotrode: ShopSonotrode  # whose face carries the chamber
     strips: Strips | None = None  # of which the target is one
@@ -171,7 +169,7 @@ def checked(
     reasons = {**reasons, "shot.mass_g": f"{reason}: {design.shot.count}", "tolerances": OF_LENGTHS}
     found = tuple(warnings(design, chamber))
     if math.isinf(floor.lean):
-        found = (f"chamber: {floor.reason}", *found)
+        found = (DesignWarning(WarningKind.WIDE_FLOOR, f"chamber: {floor.reason}"), *found)
     ranges = propose_ranges(sizes, mass_g, 1e3 * diameter, ball_mass)
     return Proposal(
         design=design,
@@ -218,24 +216,20 @@ def faults(made: Proposal) -> tuple[int, int]:
     return len(made.jams), len(made.warnings)
 
 
-def new_harm(made: Proposal, before: Proposal) -> str:
-    """Return in words the harm that a proposal does and another one does not; empty if none.
+def new_harm(made: Proposal, before: Proposal) -> DesignWarning | None:
+    """Return a warning of harm that a proposal does and another one does not; None if none.
 
     A warning that holds in both steps, at another place in each, is no new one. Nor is a gap that
     jams balls in the place of another one. That balls do not get to some of the target is no harm:
     it counts in what they serve and touch.
     """
-    known = {beginning(text) for text in before.warnings}
-    of_steps = (re.sub(r"^step \w+: ", "", text) for text in made.warnings)
-    harms = (beginning(text) for text in of_steps if not COUNTED.search(text))
-    new = [text for text in harms if text not in known]
-    jams = "balls jam in a gap" if len(made.jams) > len(before.jams) else ""
-    return next(iter(new), jams)
-
-
-def beginning(warning: str) -> str:
-    """Return a warning up to its first comma or place."""
-    return warning.partition(",")[0].partition(" at (")[0]
+    known = {one.subject for one in before.warnings}
+    for one in made.warnings:
+        if one.kind not in COUNTED and one.subject not in known:
+            return one
+    if len(made.jams) > len(before.jams):
+        return DesignWarning(WarningKind.JAM, "balls jam in a gap")
+    return None
 
 
 def touched_share(made: Proposal) -> float:

@@ -16,6 +16,7 @@ from typing import Any
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import shot_reach, warnings
 from chamberopt.chamber.checks.jams import gaps_in_reach, jam_gaps
+from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.propose.held_proposal import bore_clearance_mm
 from chamberopt.chamber.propose.proposal import (
     Proposal,
@@ -95,7 +96,7 @@ def propose_second_pose(
     except InputError as error:
         return dropped(str(error))
     if harm := new_harm(two, made):
-        return dropped(harm)
+        return dropped(harm.beginning)
     try:
         after = measure(two, longest)
     except TooSlowError as error:
@@ -146,9 +147,15 @@ def _turned_about(made: Proposal, axis: str) -> Proposal:
     """
     two = _turned_over(made, axis)
     for balls in RAISED:  # under a ceiling that fits one pose, balls may jam in the other
-        if "jam in" in new_harm(two, made):
+        if _jams_more(two, made):
             two = min(two, _turned_over(made, axis, balls), key=faults)
     return two
+
+
+def _jams_more(made: Proposal, before: Proposal) -> bool:
+    """Return whether the only new harm of a proposal is that balls jam in more gaps."""
+    harm = new_harm(made, before)
+    return harm is not None and harm.kind is WarningKind.JAM
 
 
 def _turned_over(made: Proposal, axis: str, raised: float = 0.0) -> Proposal:
@@ -216,11 +223,11 @@ def with_finer_balls(
         if not (gain > AS_GOOD or for_fillets):
             return None, f"the smaller ones serve hardly more ({shares})"
         for balls in RAISED:  # a ceiling that suits the coarse balls may hold the finer ones
-            if "gap" in (harm := new_harm(finer, coarse)):
+            if _jams_more(finer, coarse):
                 coarse = _raised(coarse, balls * finer_mm)
                 finer, found = _with_shot(coarse, finer_mm), None
         if harm := new_harm(finer, coarse):
-            return None, harm
+            return None, harm.beginning
         found, after = found or measure(coarse), measure(finer)
         if found is None or found.intensity is None or after is None:
             return None, "no pilot resolved both sizes"

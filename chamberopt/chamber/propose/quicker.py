@@ -126,7 +126,8 @@ def _harm(made: Proposal, first: Proposal) -> str:
     """Return in words why another way is no choice; empty if it is one."""
     if made.chamber.pieces_in_air and not first.chamber.pieces_in_air:
         return "nothing would hold it"
-    return new_harm(made, first)
+    harm = new_harm(made, first)
+    return harm.beginning if harm else ""
 
 
 def _is_quicker(one: Way, other: Way) -> bool:

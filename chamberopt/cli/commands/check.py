@@ -90,6 +90,7 @@ def _check(
         show(first_lines)  # the other facts take longer, above all the first time
     with step("finding what the shot reaches"):
         facts = describe(design, chamber)
+    facts["warnings"] = [one.text for one in facts["warnings"]]
     if screenshot is not None:
         with step("drawing"):
             print_remarks([draw_target(design, chamber, screenshot)])

@@ -152,7 +152,7 @@ def new(
     if not json:
         show([text(proposal_lines(words, verbose))])
     print_remarks(f"note: {one_line(note)}" for note in done.made.mesh.notes)
-    print_remarks(f"warning: {one}" for one in done.made.warnings)
+    print_remarks(f"warning: {one.text}" for one in done.made.warnings)
     if json:
         studies = [str(out / name) for name in done.studies]
         print_json({**asdict(words), "design": str(out / DESIGN), "studies": studies})

@@ -7,6 +7,7 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.facts import describe
+from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.part import Axis, posed_part, turning_axis
 from chamberopt.chamber.scene import build_scene, chamber_mesh, require_turnable
 from chamberopt.common.errors import InputError
@@ -118,10 +119,9 @@ def test_a_part_that_cannot_turn_is_refused_before_anything_is_simulated(tmp_pat
 def test_too_short_a_simulation_of_a_slow_turn_is_remarked_on(tmp_path: Path, mesh) -> None:  # type: ignore[no-untyped-def]
     slow = load_design(written(tmp_path, "{ rpm = 0.1 }"))
     require_turnable(slow, mesh, axis_of(slow))
-    assert any(
-        "takes 600 s to turn once" in warning
-        for warning in describe(slow, build_chamber(slow))["warnings"]
-    )
+    found = describe(slow, build_chamber(slow))["warnings"]
+    (said,) = (one.text for one in found if one.kind is WarningKind.PART_TURN)
+    assert "takes 600 s to turn once" in said
 
 
 def test_the_shipped_study_is_about_the_turning_gear() -> None:

@@ -9,6 +9,8 @@ import trimesh
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.gaps import gap_warnings, pocket_warnings, surface_warnings
+from chamberopt.chamber.checks.place_names import PART, PART_SIDE
+from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.largest_ball import largest_balls
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.reach import TOLERATED_OVERLAP, Reach, find_reach, reached_part_share
@@ -88,13 +90,15 @@ def test_of_a_slot_narrower_than_the_ball_nothing_is_touched_and_it_is_said() ->
     found = reached(chamber)
     assert reached_area_mm2(found, facing_x(found)) == 0.0
     (said,) = gap_warnings(found, chamber, [BALL])
-    assert "2.4 mm wide, narrower than a ball of 3 mm: no ball gets in there" in said
-    assert "the gap of the part's side" in said
+    assert said.subject == (WarningKind.NARROW_GAP, (PART_SIDE, PART_SIDE))
+    assert "2.4 mm wide, narrower than a ball of 3 mm: no ball gets in there" in said.text
+    assert "the gap of the part's side" in said.text
     (said,) = surface_warnings(found, chamber)
-    assert said.startswith("100.0% of the target in the chamber (")
+    assert said.text.startswith("100.0% of the target in the chamber (")
     (said,) = surface_warnings(found, chamber, "zone root")
-    assert said.startswith("100.0% of zone root in the chamber (")
-    assert said.endswith("; or narrow the target of zone root")
+    assert said.subject == (WarningKind.UNTOUCHED, ("zone root",))
+    assert said.text.startswith("100.0% of zone root in the chamber (")
+    assert said.text.endswith("; or narrow the target of zone root")
     assert not gap_warnings(reached(slot(3.6)), slot(3.6), [BALL])
 
 
@@ -119,7 +123,7 @@ def test_a_groove_is_touched_down_to_where_the_ball_lies_on_both_flanks(half_ang
     lowest = (10.0 + deep - 1e3 * touched[:, 2].max()) / np.cos(a)
     assert lowest == pytest.approx(first, abs=0.1)
     wedges = gap_warnings(found, chamber, [BALL])
-    assert any("balls of 3 mm can jam in" in text for text in wedges) == (half_angle == 12.0)
+    assert any(one.kind is WarningKind.JAM for one in wedges) == (half_angle == 12.0)
 
 
 def pocket(neck_mm: float) -> Chamber:
@@ -144,8 +148,10 @@ def test_a_pocket_is_reached_through_a_neck_wider_than_the_ball(neck: float, ope
     said = pocket_warnings(found, chamber)
     assert len(said) == (0 if open_ else 1)
     if said:
-        assert said[0].startswith("a pocket around (0.0, 10.0, 16")
-        assert "would hold a ball of 3 mm but has no way in" in said[0]
+        assert said[0].subject == (WarningKind.POCKET, ("a ledge of the wall", PART))
+        assert said[0].beginning == "a pocket"
+        assert said[0].text.startswith("a pocket around (0.0, 10.0, 16")
+        assert "would hold a ball of 3 mm but has no way in" in said[0].text
 
 
 @pytest.mark.parametrize("radius", [1.2, 1.45, 1.6, 2.5])

@@ -182,7 +182,7 @@ def test_what_the_shot_cannot_touch_can_be_left_out_of_the_target() -> None:
     assert "a study keeps this target for all its candidates" in note
     facts = describe(with_reachable(True, shot__diameter_mm=2.2), small)
     assert facts["reach"]["target_reachable_share"] > 0.93
-    assert not any("set part.target.reachable" in text for text in facts["warnings"])
+    assert not any("set part.target.reachable" in one.text for one in facts["warnings"])
 
 
 def test_a_target_can_be_given_to_a_chamber() -> None:

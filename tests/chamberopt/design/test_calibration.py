@@ -11,6 +11,7 @@ import pytest
 import tomlkit
 
 from chamberopt.chamber.checks.calibration import calibration_warnings
+from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.common.errors import InputError
 from chamberopt.coverage.metrics import metric_problem
 from chamberopt.design.calibration import calibrated_strip
@@ -162,10 +163,12 @@ def test_what_is_outside_the_calibration_is_said() -> None:
     )
     found = calibration_warnings(far)
     assert len(found) == 4
-    for text, word in zip(found, ("40", "1.5 mm", "another material", "dents"), strict=True):
-        assert word in text
+    for one, word in zip(found, ("40", "1.5 mm", "another material", "dents"), strict=True):
+        assert word in one.text
+    assert {one.kind for one in found} == {WarningKind.CALIBRATION}
+    assert len({one.subject for one in found}) == 4
     without = plate_design(calibration=machine_values(v0=1.0))
-    assert any("no arc heights" in text for text in calibration_warnings(without))
+    assert any("no arc heights" in one.text for one in calibration_warnings(without))
 
 
 def test_friction_in_only_one_of_design_and_calibration_is_said() -> None:
@@ -175,6 +178,6 @@ def test_friction_in_only_one_of_design_and_calibration_is_said() -> None:
                                    ("none", fitted, "too fast"),
                                    ("catalogue", fitted, ""), ("none", without, "")):  # fmt: skip
         design = plate_design(calibration=calibration, effects__friction=own)
-        found = [text for text in calibration_warnings(design) if "friction" in text]
+        found = [one for one in calibration_warnings(design) if one.about == ("friction",)]
         assert len(found) == (1 if word else 0)
-        assert all(word in text for text in found)
+        assert all(word in one.text for one in found)

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.build import TARGET, build_chamber
 from chamberopt.chamber.checks.facts import describe
+from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.load import Design, load_design
@@ -97,7 +98,10 @@ def test_check_tells_of_each_step_and_of_what_no_step_reaches() -> None:
     assert facts["steps"]["turned"]["target_exposed_area_mm2"] == pytest.approx(672.0)
     assert facts["target"]["exposed_area_mm2"] == pytest.approx(1344.0)
     assert facts["replicas"]["simulated_s_in_all"] == pytest.approx(4 * 0.4)
-    assert not any("in any step" in text for text in facts["warnings"])
+    assert not any(one.kind is WarningKind.UNTOUCHED for one in facts["warnings"])
     wide = design.changed({"part.target.box_mm": ((-13.0, -13.0, -0.1), (30.1, 13.0, 10.1))})
     warned = describe(wide, build_chamber(wide))["warnings"]
-    assert any("of the target" in text and "3 mm in any step" in text for text in warned)
+    (said,) = (one for one in warned if one.kind is WarningKind.UNTOUCHED)
+    assert (said.about, said.step) == ((TARGET,), "")
+    assert "of the target" in said.text
+    assert "3 mm in any step" in said.text

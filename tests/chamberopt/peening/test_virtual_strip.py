@@ -117,7 +117,7 @@ def test_millimetres_of_discs_are_not_called_those_of_whole_strips(tmp_path: Pat
         found = peen_strip(setting, build_chamber(setting.design), SerialExecutor())
         assert found.unit == unit
         assert f"arc heights are those of a {strips}" in found.notes[0]
-        assert any("not of a whole strip" in said for said in calibration_warnings(one)) == (
+        assert any("not of a whole strip" in said.text for said in calibration_warnings(one)) == (
             unit == "mm"
         )
 

@@ -16,6 +16,8 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import shot_reach, warnings
 from chamberopt.chamber.checks.facts import describe
 from chamberopt.chamber.checks.gaps import find_ledges, gutter_warnings
+from chamberopt.chamber.checks.place_names import CEILING, PART, PART_SIDE, SIDE_WALL, UPPER_SIDE
+from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
 from chamberopt.design.shapes import TAG_SONOTRODE
@@ -32,6 +34,10 @@ def made(name: str, **values: float) -> tuple[Design, Chamber]:
     return design, build_chamber(design)
 
 
+def texts_of(kind: WarningKind, design: Design, chamber: Chamber) -> list[str]:
+    return [one.text for one in warnings(design, chamber) if one.kind is kind]
+
+
 def without_gravity(design: Design) -> Design:
     return design.model_copy(
         update={"effects": design.effects.model_copy(update={"gravity": False})}
@@ -46,7 +52,7 @@ def gear() -> tuple[Design, Chamber]:
 def test_a_level_top_is_warned_of_with_area_place_and_remedy(gear: tuple[Design, Chamber]) -> None:
     """The gear's upper face: a toothed disc between radius 20 and 22 mm, less the shaft."""
     design, chamber = gear
-    (said,) = (text for text in warnings(design, chamber) if "come to rest" in text)
+    (said,) = texts_of(WarningKind.REST, design, chamber)
     assert "come to rest on the part, which neither vibrates nor turns" in said
     assert "around (0.0, 0.0, 25.0) mm in the chamber's frame, at z = 25 mm" in said
     assert "effects.part_turn" in said
@@ -54,7 +60,7 @@ def test_a_level_top_is_warned_of_with_area_place_and_remedy(gear: tuple[Design,
     shaft = math.pi * 8**2
     assert 0.5 * math.pi * 22**2 - shaft < area < math.pi * 22**2 - shaft / 2
     (ledge,) = find_ledges(design, chamber)
-    assert ledge.level
+    assert (ledge.name, ledge.level) == (PART, True)
     assert not find_ledges(without_gravity(design), chamber)
 
 
@@ -130,9 +136,10 @@ def test_balls_rest_in_a_gutter_between_a_roof_and_the_wall(
     chamber = build_chamber(design)
     found = gutter_warnings(design, chamber, shot_reach(design, chamber))
     assert bool(found) == bool(length)
-    for text in found:
-        assert "come to rest on the part in the gutter between it and the wall" in text
-        told = float(text.split("about ")[1].split(" mm")[0])
+    for one in found:
+        assert one.subject == (WarningKind.REST, (PART, SIDE_WALL))
+        assert "come to rest on the part in the gutter between it and the wall" in one.text
+        told = float(one.text.split("about ")[1].split(" mm")[0])
         assert told == pytest.approx(2 * length, rel=0.1)
     assert not gutter_warnings(without_gravity(design), chamber, shot_reach(design, chamber))
 
@@ -158,17 +165,18 @@ def test_what_is_to_be_settled_is_warned_of_until_it_is_taken_out(
     design, chamber = gear
     matter = "CHOSEN BY SIZE ALONE: confirm it"
     open_one = design.changed({"to_settle": [matter]})
-    new = set(warnings(open_one, chamber)) - set(warnings(design, chamber))
-    assert new == {f"to be settled: {matter}"}
+    (new,) = set(warnings(open_one, chamber)) - set(warnings(design, chamber))
+    assert (new.kind, new.text) == (WarningKind.TO_SETTLE, f"to be settled: {matter}")
     assert open_one.changed({"to_settle": []}) == design
 
 
 def test_a_part_through_the_side_wall_is_warned_of(gear: tuple[Design, Chamber]) -> None:
     """No warning for a shaft through the ceiling, a lid, or a shaft that turns in the wall."""
-    assert not any("side wall between z" in text for text in warnings(*gear))
+    assert not texts_of(WarningKind.SIDE_WALL, *gear)
     for name in ("plate", "gear_turning"):
-        assert not any("side wall between z" in text for text in warnings(*made(name))), name
-    said = " ".join(warnings(*made("gear", chamber__diameter_mm=42.0, shot__diameter_mm=4.0)))
+        assert not texts_of(WarningKind.SIDE_WALL, *made(name)), name
+    narrow = made("gear", chamber__diameter_mm=42.0, shot__diameter_mm=4.0)
+    (said,) = texts_of(WarningKind.SIDE_WALL, *narrow)
     assert "goes out through the side wall between z = 15 and 25 mm" in said
     assert "chamber.diameter_mm" in said
 
@@ -177,12 +185,12 @@ def test_a_part_that_turns_down_to_the_sonotrode_is_warned_of() -> None:
     """The gear turned about a line 6.9 mm below its own axis comes down to 1.2 mm."""
     eccentric = {"effects.part_turn.through_mm.1": -6.9}
     design, chamber = made("gear_turning")
-    said = " ".join(warnings(design.changed(eccentric), chamber))
+    (said,) = texts_of(WarningKind.TURNING_GAP, design.changed(eccentric), chamber)
     assert (
         "the gap between turning part and sonotrode is 1.16 mm, narrower than a ball of 1.5 mm"
         in said
     )
-    assert "turning part" not in " ".join(warnings(design, chamber))
+    assert not texts_of(WarningKind.TURNING_GAP, design, chamber)
     # 5 degrees to each side, a point 22 mm under the gear's axis hardly gets lower than at rest
     swings = design.changed(eccentric)
     motion = swings.effects.part_turn.model_copy(
@@ -191,7 +199,7 @@ def test_a_part_that_turns_down_to_the_sonotrode_is_warned_of() -> None:
     swings = swings.model_copy(
         update={"effects": swings.effects.model_copy(update={"part_turn": motion})}
     )
-    assert "turning part" not in " ".join(warnings(swings, chamber))
+    assert not texts_of(WarningKind.TURNING_GAP, swings, chamber)
 
 
 def test_balls_that_would_meet_but_are_let_through_each_other_are_warned_of() -> None:
@@ -199,10 +207,11 @@ def test_balls_that_would_meet_but_are_let_through_each_other_are_warned_of() ->
     through = design.model_copy(
         update={"effects": design.effects.model_copy(update={"ball_collisions": False})}
     )
-    assert any("effects.ball_collisions is false" in text for text in warnings(through, chamber))
-    assert not any("ball_collisions" in text for text in warnings(design, chamber))
+    (said,) = texts_of(WarningKind.COLLISIONS, through, chamber)
+    assert "effects.ball_collisions is false" in said
+    assert not texts_of(WarningKind.COLLISIONS, design, chamber)
     alone = through.changed({"shot.mass_g": 1e-3 * round(1e6 * design.shot.ball_mass)})
-    assert not any("ball_collisions" in text for text in warnings(alone, chamber))
+    assert not texts_of(WarningKind.COLLISIONS, alone, chamber)
 
 
 def test_what_a_ball_can_touch_is_a_fact_and_what_it_cannot_a_warning() -> None:
@@ -213,33 +222,30 @@ def test_what_a_ball_can_touch_is_a_fact_and_what_it_cannot_a_warning() -> None:
     assert reach["target_reachable_mm2"] == pytest.approx(
         reach["target_reachable_share"] * facts["target"]["exposed_area_mm2"], rel=1e-3
     )
-    (said,) = (
-        text for text in facts["warnings"] if "cannot be touched by a ball of 2.5 mm" in text
-    )
+    (warning,) = (one for one in facts["warnings"] if one.kind is WarningKind.UNTOUCHED)
+    said = warning.text
+    assert "cannot be touched by a ball of 2.5 mm" in said
     share = 100.0 * (1.0 - reach["target_reachable_share"])
     assert float(said.split("%")[0]) == pytest.approx(share, abs=0.1)
     assert 5.0 < share < 35.0  # the roots of the teeth
     assert "part.target.reachable = true" in said
-    assert not any("cannot be touched" in text for text in warnings(*made("plate")))
+    assert not texts_of(WarningKind.UNTOUCHED, *made("plate"))
 
 
 def test_a_gap_too_low_for_a_ball_is_warned_of_with_its_place_and_width() -> None:
-    (said,) = (
-        text
-        for text in warnings(*made("gear", chamber__height_mm=26.0))
-        if "the gap between" in text
+    low, narrow = (
+        [one for one in warnings(*made("gear", **size)) if one.kind is WarningKind.NARROW_GAP]
+        for size in ({"chamber__height_mm": 26.0}, {"chamber__diameter_mm": 46.0})
     )
+    assert [one.about for one in (*low, *narrow)] == [(CEILING, UPPER_SIDE), (PART_SIDE, SIDE_WALL)]
+    said = low[0].text
     assert "the gap between the ceiling and the part's upper side at (" in said
     assert ", 25.5) mm in the chamber's frame is 1 to 1.0" in said
     assert (
         "narrower than a ball of 1.5 mm: no ball gets in there; raise the ceiling or close "
         "the gap" in said
     )
-    (said,) = (
-        text
-        for text in warnings(*made("gear", chamber__diameter_mm=46.0))
-        if "gaps between" in text
-    )
+    said = narrow[0].text
     assert said.startswith("each of 20 gaps between the part's side and the wall, one at (")
     assert "no ball gets in there; enlarge the chamber" in said
 
@@ -272,8 +278,6 @@ def test_a_sonotrode_that_comes_near_the_part_is_warned_of(gear: tuple[Design, C
     vertices = chamber.vertices.copy()
     vertices[floor, 2] = 14.7e-3
     quick = design.changed({"shot.diameter_mm": 4.0})  # what large balls reach is found sooner
-    (said,) = (
-        text for text in warnings(quick, replace(chamber, vertices=vertices)) if "apart" in text
-    )
+    (said,) = texts_of(WarningKind.CONTACT, quick, replace(chamber, vertices=vertices))
     assert "part and sonotrode are only 0.3 mm apart, less than ten amplitudes of 40 µm" in said
     assert "chamber.sonotrode_distance_mm" in said

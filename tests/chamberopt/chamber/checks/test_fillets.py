@@ -9,6 +9,7 @@ from scipy.spatial import Delaunay
 
 from chamberopt.chamber.checks.check import shot_reach
 from chamberopt.chamber.checks.fillets import fillet_warnings, inner_edges
+from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from tests.helpers.synthetic import chamber_round
 
 SIDES = 48
@@ -39,7 +40,7 @@ def test_no_fillets_are_found_on_a_shaft_whose_triangles_are_not_even() -> None:
     assert length.sum() > 1.0
 
 
-def warned(mesh: trimesh.Trimesh, ball: float) -> list[str]:
+def warned(mesh: trimesh.Trimesh, ball: float) -> list[DesignWarning]:
     chamber = chamber_round(mesh)
     shot = SimpleNamespace(diameters=(ball,), diameter=ball)
     reach = shot_reach(SimpleNamespace(shot=shot), chamber)
@@ -53,9 +54,10 @@ def test_shot_of_more_than_half_a_fillet_or_a_quarter_of_a_slot_is_warned_of() -
     other = trimesh.creation.box(bounds=[[0.009, 0, 0.0], [0.012, 0.02, 0.02]])
     corner = trimesh.boolean.union([foot, wall], engine="manifold")
     (said,) = warned(corner, 1e-3)
-    assert "half the radius of the target's smallest fillets (inner edges without one" in said
+    assert said.kind is WarningKind.FILLET
+    assert "half the radius of the target's smallest fillets (inner edges without one" in said.text
     assert warned(foot, 1e-3) == []
     slot = trimesh.boolean.union([corner, other], engine="manifold")
-    assert [text for text in warned(slot, 1.4e-3) if "slot" in text] == []
-    (said,) = (text for text in warned(slot, 1.6e-3) if "slot" in text)
-    assert "quarter of the target's narrowest slot, about 6.01 mm wide" in said  # 6 by design
+    assert [one for one in warned(slot, 1.4e-3) if one.kind is WarningKind.SLOT] == []
+    (said,) = (one for one in warned(slot, 1.6e-3) if one.kind is WarningKind.SLOT)
+    assert "quarter of the target's narrowest slot, about 6.01 mm wide" in said.text  # 6 by design

@@ -9,6 +9,8 @@ import trimesh
 from chamberopt.chamber.build import Chamber
 from chamberopt.chamber.checks.gaps import gap_warnings
 from chamberopt.chamber.checks.jams import FRICTION, JAM_BAND, find_gaps, gaps_in_reach, jam_gaps
+from chamberopt.chamber.checks.place_names import PART_SIDE
+from chamberopt.chamber.checks.warning import WarningKind
 from tests.chamberopt.chamber.test_reach import BALL, ROOM, cavity, prism, reached, slot
 
 LOCKING = math.degrees(math.atan(FRICTION))  # half angle of a wedge below which it is self-locking
@@ -84,12 +86,13 @@ def test_a_gap_that_no_ball_gets_near_jams_none() -> None:
 
 def test_check_says_where_balls_jam_and_which_do_not() -> None:
     chamber = slot(2.982)  # 0.994 balls
-    (text,) = gap_warnings(reached(chamber), chamber, [BALL])
-    assert text == (
+    (found,) = gap_warnings(reached(chamber), chamber, [BALL])
+    assert found.subject == (WarningKind.JAM, (PART_SIDE, PART_SIDE))
+    assert found.text == (
         "balls of 3 mm can jam in the gap of the part's side at (0.0, 10.2, 12.3) mm in the "
         "chamber's frame, 2.98 mm wide there, on 46 % of the target; use balls below 2.59 mm or "
         "above 3.32 mm, or close it where it is not to be peened"
     )
     (locks,) = gap_warnings(reached(wedge(10.0)), wedge(10.0), [BALL])
-    assert "2.7 to 3.44 mm wide there" in locks
-    assert "use balls" not in locks
+    assert "2.7 to 3.44 mm wide there" in locks.text
+    assert "use balls" not in locks.text

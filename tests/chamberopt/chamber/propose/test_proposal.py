@@ -1,11 +1,14 @@
 """Tolerances of a proposal, by ISO 2768-1 class m and of the amplitude, and its study's bounds."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from chamberopt.chamber.propose.proposal import holding, new_harm, propose_tolerances
+from chamberopt.chamber.checks.place_names import PART, PART_SIDE
+from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
+from chamberopt.chamber.propose.proposal import COUNTED, holding, new_harm, propose_tolerances
 from tests.helpers.synthetic import plate_design
 
 
@@ -38,18 +41,24 @@ def test_a_study_holds_the_design_with_which_it_starts() -> None:
     assert found["chamber.sonotrode_distance_mm"] == {"choose": [10.0, 20.0]}
 
 
-def found(*warnings: str, jams: int = 0) -> Any:
+def found(*warnings: DesignWarning, jams: int = 0) -> Any:
     return SimpleNamespace(warnings=warnings, jams=(None,) * jams)
 
 
-def test_a_gap_that_jams_balls_in_the_place_of_another_is_no_new_harm() -> None:
-    before = found("balls of 1 mm can jam in the gap of the part's side at (1, 2, 3) mm", jams=1)
-    at_holder = "balls of 1 mm can jam in the gap between the holder and the part's side, 1 mm wide"
-    rests = "step two: balls can come to rest on the part, which does not turn"
+def test_new_harm_is_told_by_kind_and_subject() -> None:
+    """A gap that jams balls in the place of another, and what no ball touches, are no new harm."""
+    at_side = DesignWarning(WarningKind.JAM, "balls of 1 mm can jam", (PART_SIDE, PART_SIDE))
+    at_holder = DesignWarning(WarningKind.JAM, "balls of 1 mm can jam", ("the holder", PART_SIDE))
+    pocket = DesignWarning(WarningKind.POCKET, "a pocket around (1, 2, 3) mm", (PART,))
+    rests = DesignWarning(WarningKind.REST, "balls can come to rest, around (1, 2, 3)", (PART,))
+    before = found(at_side, replace(pocket, step="one"), jams=1)
     for made, harm in (
-        (found(at_holder, jams=1), ""),
+        (found(at_holder, jams=1), None),
         (found(at_holder, at_holder, jams=2), "balls jam in a gap"),
-        (found("12% of the target cannot be touched by a ball of 1 mm"), ""),
-        (found(at_holder, rests, jams=1), "balls can come to rest on the part"),
+        (found(replace(pocket, message="a pocket around (9, 2, 3) mm", step="two")), None),
+        (found(replace(pocket, about=("the holder", PART))), "a pocket"),
+        (found(at_holder, replace(rests, step="two"), jams=2), "balls can come to rest"),
+        *((found(DesignWarning(kind, "less is peened")), None) for kind in COUNTED),
     ):
-        assert new_harm(made, before) == harm
+        new = new_harm(made, before)
+        assert (new and new.beginning) == harm

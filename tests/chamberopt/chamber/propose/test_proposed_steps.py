@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
+from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.propose import proposed_steps
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
@@ -63,8 +64,9 @@ def test_each_size_peens_for_its_own_time_in_one_chamber(coarse: Proposal, tmp_p
     (alone,) = seen  # the finer balls are simulated by themselves
     assert alone.design.shot == second.shot
     assert two.chamber.pieces_in_air == coarse.chamber.pieces_in_air
-    warned = [one for one in two.warnings if "shot of" in one]  # the slot is for the finer balls
-    assert [one.partition(" mm")[0] for one in warned] == ["step finer: shot of 1"]
+    narrow = {WarningKind.FILLET, WarningKind.SLOT}  # the slot is for the finer balls
+    warned = [one for one in two.warnings if one.kind in narrow]
+    assert [one.text.partition(" mm")[0] for one in warned] == ["step finer: shot of 1"]
     told = two.reasons[".steps"]
     assert told.startswith("3 mm balls for 900 s, then 1 mm for 420 s: ")
     assert "about 0.3 mmA on the" in told
@@ -121,19 +123,21 @@ def test_what_stands_against_finer_balls_is_told(
     assert reason == f"{LARGER}: 80%; no finer balls after them: {why}"
     assert without_finer(coarse, why) == coarse
 
-    for text, harm in (
-        ("0.6% of the target cannot be touched, at", ""),
-        ("balls jam, at", "balls jam"),
+    for kind, text, harm in (
+        (WarningKind.UNTOUCHED, "0.6% of the target cannot be touched, at", ""),
+        (WarningKind.PACKING, "they hinder each other, at", "they hinder each other"),
     ):
-        monkeypatch.setattr(proposed_steps, "warnings", lambda *_, said=text: [said])
+        one = DesignWarning(kind, text)
+        monkeypatch.setattr(proposed_steps, "warnings", lambda *_, said=one: [said])
         _, why = with_finer_balls(coarse, found, FINER, lambda _: None)
         assert why == (harm or "no pilot resolved both sizes")
 
-    low, told = coarse.design.chamber.height_mm, "the gap between two sides"
+    low = coarse.design.chamber.height_mm
+    monkeypatch.setattr(proposed_steps, "warnings", lambda *_: [])
     monkeypatch.setattr(
         proposed_steps,
-        "warnings",
-        lambda one, _: [told] * (one.chamber.height_mm < low + 2.0 and one.shot.diameter < 2e-3),
+        "jam_gaps",
+        lambda room, ball, _: [None] * (1e3 * room.height < low + 2.0 and ball < 2e-3),
     )
 
     def measure(one: Proposal) -> Measured:

@@ -11,6 +11,7 @@ import trimesh
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import warnings
+from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.propose import proposed_steps
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.held_proposal import rests
@@ -160,8 +161,7 @@ def test_balls_that_rest_on_what_is_turned_down_later_are_no_warning(
     x, y, z = over.design.part.rotate_deg
     steps = [steps[0], {**steps[1], "part": {"rotate_deg": [x, y, z + 180.0]}}]
     turned = over.design.changed({"steps": steps, "holder": None})
-    texts = warnings(turned, build_chamber(turned))
-    assert any("come to rest on the part" in text for text in texts)
+    assert rests(replace(over, warnings=tuple(warnings(turned, build_chamber(turned)))))
 
 
 def test_more_sonotrodes_must_save_more_time(poses: dict[Pose | None, Proposal]) -> None:
@@ -285,16 +285,20 @@ def test_a_warning_of_both_poses_is_no_reason_against_the_second(
     poses: dict[Pose | None, Proposal], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its place differs from pose to pose. A warning of the second pose alone is a reason."""
-    slot = "balls are larger than a quarter of a slot, e.g. at ({}, 0, 0) mm: use smaller balls"
-    texts = [f"step first: {slot.format(1)}", f"step turned_over: {slot.format(2)}"]
-    lying = replace(poses["lying"], warnings=(slot.format(1),))
 
-    def pose_two(more: list[str]) -> Proposal:
-        monkeypatch.setattr(proposed_steps, "warnings", lambda design, chamber: [*texts, *more])
+    def rest(place: int, on: str, step: str = "") -> DesignWarning:
+        text = f"balls can come to rest on {on}, e.g. at ({place}, 0, 0) mm: turn it"
+        return DesignWarning(WarningKind.REST, text, (on,), step)
+
+    both = [rest(1, "the holder", "first"), rest(2, "the holder", "turned_over")]
+    lying = replace(poses["lying"], warnings=(rest(1, "the holder"),))
+
+    def pose_two(more: list[DesignWarning]) -> Proposal:
+        monkeypatch.setattr(proposed_steps, "warnings", lambda design, chamber: [*both, *more])
         return propose_second_pose(lying, uneven(900.0), lambda *_: measured(400.0))[0]
 
     assert pose_two([]).design.steps
-    kept = pose_two(["step turned_over: balls can come to rest on the part: 20 mm²"])
+    kept = pose_two([rest(3, "the part", "turned_over")])
     assert kept.design == lying.design
     assert (
         "after half of the time: balls can come to rest on the part"
