@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.chamber.checks.place_names import PART_SIDES
+from chamberopt.chamber.checks.place_names import PART_SIDES, SIDE_WALL
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.propose.held_proposal import (
@@ -418,7 +418,8 @@ def _takes_room(warning: DesignWarning) -> bool:
     kind = warning.kind
     if kind in (WarningKind.JAM, WarningKind.NARROW_GAP):
         return not PART_SIDES.issuperset(warning.about)
-    return kind in (WarningKind.TURNING_GAP, WarningKind.SIDE_WALL)
+    gutter = kind == WarningKind.REST and SIDE_WALL in warning.about
+    return gutter or kind in (WarningKind.TURNING_GAP, WarningKind.SIDE_WALL)
 
 
 def _too_large(made: Proposal, stock_mm: Sequence[float]) -> str:
