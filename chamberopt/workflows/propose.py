@@ -254,7 +254,7 @@ class _Pilots:
             now, sought = self._with_intensity(now, sought, sought.asked)
         self.begin(FURTHER_STEP)
         now, others = self._beside(now, sought, by_geometry)
-        trials = of_ball_sizes([now, *others]) if others else ()
+        trials, why = of_ball_sizes([now, *others]) if others else (), ""
         if asked := sought.asked:
             enough = [one for one in others if gives(asked, one.found)]
             coarse = now if gives(asked, now.found) or not enough else enough[0]
@@ -262,8 +262,8 @@ class _Pilots:
             two, why = with_finer_balls(coarse.made, coarse.found, by_geometry, measure)
             if two is not None:
                 return replace(with_thin_places(two), trials=trials)
-            now = larger_instead(now, others, trials, asked) or now
-            now = now._replace(made=without_finer(now.made, why))
+        now = larger_instead(now, others, trials, sought.asked) or now
+        now = now._replace(made=without_finer(now.made, why))
         found = now.found
         if found is not None and not found.settled:
             found = self._measure(now.made, is_told=False) or found

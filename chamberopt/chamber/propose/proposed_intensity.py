@@ -14,6 +14,7 @@ from chamberopt.chamber.propose.proposed_balls import (
     AS_GOOD,
     DEEPEST,
     LARGEST_BALL,
+    MANY,
     MISSED,
     MISSED_FILLETS,
     OF_THIN,
@@ -55,6 +56,9 @@ INTENSITY = "process.intensity_mmA"  # whose reason stands in a design without a
 MOST_TRIED = 3  # larger sizes that pilots compare
 FURTHER = 2.0  # times as large as the proposed balls, where no intensity says how far
 LARGER = "LARGER BALLS FOR THE INTENSITY"
+# Larger balls in the place of more than MANY, by heart: at most so many of theirs, share of the
+# target that they serve less, and time over theirs, which pilots know to 10 to 20 %.
+FEWER, SERVED_LESS, AS_QUICK = 0.6, 0.15, 1.1
 
 
 class IntensityPilot(NamedTuple):
@@ -181,8 +185,12 @@ def settings_beside(
     stock = (wanted.shop or usual_shop()).stock_mm(made.tables["shot"]["material"])
     most = 1e3 * min(LARGEST_BALL, OF_THIN * thinnest(made.chamber.part))
     larger = [one for one in stock if now.ball_mm < one <= most]
+    many = made.design.shot.count > MANY
+    if many:
+        fits = fit_sizes(made.chamber.part, [1e-3 * one for one in larger]) if larger else []
+        larger = [one for one, fit in zip(larger, fits, strict=True) if not fit.jam]
     larger = larger[: sum(one < needed for one in larger) + 1]
-    most_tried = MOST_TRIED if off < 0.0 else 2 if intensity is None else 1
+    most_tried = MOST_TRIED if off < 0.0 or many else 2 if intensity is None else 1
     some = np.unique(np.linspace(len(larger) - 1, 0, most_tried).round().astype(int))
     sizes = {by_geometry, *(larger[k] for k in some if larger)} - {now.ball_mm}
     if intensity is not None and off >= 0.0 and by_geometry > now.ball_mm:
@@ -256,40 +264,61 @@ def larger_instead(
 ) -> Compared | None:
     """Return the proposal with larger balls that is taken instead of one by geometry, if one is.
 
-    Its balls give the intensity, which the others miss, touch about as much, and cover the target
-    no later by pilots, on no more sonotrodes.
+    They touch about as much, on no more sonotrodes. Either they give the intensity, which the
+    others miss, and cover the target no later by pilots; or the others are very many, and these are
+    far fewer, serve little less, and cover it about as soon with an intensity in its range.
 
     Args:
         now: the proposal whose balls fit fillets and slots by rule.
         others: proposals with other balls.
         trials: what is known of the balls of all of them.
+        intensity: that is asked for; None for the usual one, if there is one.
     """
-    if now.found is None or now.found.intensity is None or gives(intensity, now.found):
-        return None
-    if not others:
+    if now.found is None or not others:
         return None
     here, fits = setting_of(now.made), {one.ball_mm: one.fit for one in trials}
-    fit = fits[here.ball_mm]
+    fit, count = fits[here.ball_mm], now.made.design.shot.count
+    weak = intensity is not None and now.found.intensity is not None
+    weak = weak and not gives(intensity, now.found)
     for one in sorted(others, key=lambda one: setting_of(one.made).ball_mm):
         there, found = setting_of(one.made), one.found
-        if found is None or one.harm or there.ball_mm < here.ball_mm or not gives(intensity, found):
+        if found is None or one.harm or there.ball_mm < here.ball_mm:
             continue
-        other = fits[there.ball_mm]
+        other, its_count = fits[there.ball_mm], one.made.design.shot.count
+        given = gives(intensity, found) if intensity else not is_off(one.made, found.intensity)
         if (
-            other.touched >= fit.touched - MISSED
-            and other.fillets >= fit.fillets - MISSED_FILLETS
-            and found.places >= now.found.places
-            and found.time_to_98 <= now.found.time_to_98
-            and one.made.sonotrode_count <= now.made.sonotrode_count
+            not given
+            or other.touched < fit.touched - MISSED
+            or other.fillets < fit.fillets - MISSED_FILLETS
+            or found.places < now.found.places
+            or one.made.sonotrode_count > now.made.sonotrode_count
         ):
+            continue
+        ratio = found.time_to_98 / now.found.time_to_98
+        kept = f"they touch {other.touched:.0%} of the target"
+        if weak and ratio <= 1.0:
             reason = (
-                f"{LARGER}: they touch {other.touched:.0%} of the target and cover it no later by "
+                f"{LARGER}: {kept} and cover it no later by "
                 f"pilots than {here.in_words}, which are too weak; but {1.0 - other.served:.0%} of "
                 "it lies in fillets of less than 2 or slots of less than 4 of their diameters, for "
                 f"which practice takes smaller ones (--ball-mm {here.ball_mm:g} takes these)"
             )
-            reasons = {**one.made.reasons, "shot.diameter_mm": reason}
-            return one._replace(made=replace(one.made, reasons=reasons))
+        elif (
+            count > MANY
+            and its_count <= FEWER * count
+            and other.served >= fit.served - SERVED_LESS
+            and ratio <= AS_QUICK
+        ):
+            reason = (
+                f"FEWER BALLS: {kept}, serve {other.served:.0%} and cover it about as soon by "
+                f"pilots as {count:,} of {here.ball_mm:g} mm, which serve {fit.served:.0%} "
+                f"(--ball-mm {here.ball_mm:g} takes these)"
+            )
+        else:
+            continue
+        made = one.made if intensity else with_expected_intensity(one.made, found.intensity)
+        reasons = {**made.reasons, "shot.diameter_mm": reason}
+        return one._replace(made=replace(made, reasons=reasons))
     return None
 
 

@@ -270,7 +270,7 @@ def _raised(made: Proposal, by_mm: float) -> Proposal:
 def without_finer(coarse: Proposal, why: str) -> Proposal:
     """Return a proposal with coarse balls that tells why no finer ones follow, if it has such."""
     reason = coarse.reasons["shot.diameter_mm"]
-    if not reason.startswith(LARGER):
+    if not why or not reason.startswith(LARGER):
         return coarse
     reasons = {**coarse.reasons, "shot.diameter_mm": f"{reason}; no finer balls after them: {why}"}
     return replace(coarse, reasons=reasons)

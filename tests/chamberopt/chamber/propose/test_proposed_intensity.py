@@ -461,6 +461,17 @@ def test_larger_balls_are_taken_that_give_the_intensity_and_are_no_slower(
     assert larger_instead(now, [], (), asked) is None  # no other size could be tried
     enough = Compared(made, pilot_of(0.12, 600.0))
     assert larger_instead(enough, [good], trials, asked) is None
+    # Of very many balls, larger ones that are far fewer are taken, though the intensity is met.
+    ball_g = 1e3 * made.design.shot.ball_mass
+    many = replace(made, design=made.design.changed({"shot.mass_g": 4000 * ball_g}))
+    taken = larger_instead(enough._replace(made=many), [good], trials, asked)
+    assert taken is not None
+    assert taken.made.design == larger.design
+    reason = taken.made.reasons["shot.diameter_mm"]
+    assert reason.startswith("FEWER BALLS: they touch 100% of the target, serve 100% and cover")
+    assert "about as soon by pilots as 4,000 of 1 mm" in reason
+    slow = good._replace(found=pilot_of(0.12, 700.0))
+    assert larger_instead(enough._replace(made=many), [slow], trials, asked) is None
     # The smallest that does it is taken.
     (small,) = (Compared(propose(plate, replace(wanted, ball_mm=1.5), lambda _: []), strong),)
     three = [good, small]
