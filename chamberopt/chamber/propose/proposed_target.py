@@ -161,6 +161,11 @@ PATTERN = 6  # number of alike faces that make a repeated feature, such as teeth
 # Such features are at least this share of the part's area, and stand round an axis: the variances
 # of their middles along both axes of their plane differ by less than RING.
 LARGE_PATTERN, RING = 0.1, 0.1
+# A face may go on from tooth to tooth: the mean radius over the angle round its axis then swings by
+# so much of itself or more, and repeats: this share of its variance is that of one harmonic and of
+# its multiples.
+SWING, PERIODIC, ANGLES = 0.02, 0.8, 720
+FLAT = 0.95  # sum of a face's area vectors over its area, above which it is flat
 SHARPER_DEG = 45.0, 60.0  # of edges, where those of CREASE_DEG part a coarse mesh into facets
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
 BY_PROGRAM = re.compile(r"(?:created|exported|generated|written)[\s_-]+(?:by|from|with)\b", re.I)
@@ -278,15 +283,23 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
     repeated = [one for one in faces if one.keys["faces"][0].get("alike")]
     counts = {one.name: _count(one) for one in repeated}
     features = [one for one in repeated if counts[one.name] >= PATTERN and _is_ring(mesh, one)]
+    patterns: list[tuple[list[Surface], str]] = []
     if features:
         best = max(features, key=lambda one: float(area[one.triangles].sum()))
         fits = {counts[best.name] * k // 2 for k in (1, 2, 4)}
         pattern = [one for one in features if counts[one.name] in fits]
-        size = sum(float(area[one.triangles].sum()) for one in pattern)
-        if size >= LARGE_PATTERN * area.sum():
-            others = [one for one in faces if one not in pattern]
-            text = "faces that repeat round the part, such as those of teeth"
-            return _joined(pattern, f"{text}{beside(others)}; {BY_SHAPE}")
+        patterns.append((pattern, "faces that repeat round the part, such as those of teeth"))
+    single = [(one, _teeth(mesh, one)) for one in faces if one not in repeated]
+    patterns += [
+        ([one], f"it repeats {teeth} times round an axis, as teeth do")
+        for one, teeth in single
+        if teeth >= PATTERN
+    ]
+    sizes = [sum(float(area[x.triangles].sum()) for x in pattern) for pattern, _ in patterns]
+    if max(sizes, default=0.0) >= LARGE_PATTERN * area.sum():
+        pattern, text = patterns[int(np.argmax(sizes))]
+        others = [one for one in faces if one not in pattern]
+        return _joined(pattern, f"{text}{beside(others)}; {BY_SHAPE}")
     if fillets:
         text = f"by their shape, as such are usually peened{beside(faces)}; {BY_SHAPE}"
         return _joined(fillets, text)
@@ -316,6 +329,36 @@ def _is_ring(mesh: PartMesh, alike: Surface) -> bool:
     places = np.stack([np.bincount(row, weight * x) / whole for x in middle.T], axis=1)
     _, wide, widest = np.linalg.eigvalsh(np.cov(places.T, bias=True))
     return len(numbers) > 2 and bool(widest - wide < RING * widest)
+
+
+def _teeth(mesh: PartMesh, face: Surface) -> int:
+    """Return how often a face repeats round its axis, such as one of all teeth; 0 if it does not.
+
+    Its axis goes through its middle, across the plane in which it spreads alike. A flat face, such
+    as the end of a gear, has no teeth.
+    """
+    vectors = area_vectors(mesh.vertices, mesh.triangles[face.triangles])
+    if np.linalg.norm(vectors.sum(axis=0)) > FLAT * np.linalg.norm(vectors, axis=1).sum():
+        return 0
+    corners = mesh.vertices[mesh.triangles[face.triangles]]
+    weight = areas(mesh.vertices, mesh.triangles[face.triangles])
+    middles = corners.mean(axis=1)
+    middles = middles - np.average(middles, axis=0, weights=weight)
+    spread, axes = np.linalg.eigh(np.cov(middles.T, aweights=weight, bias=True))
+    odd = 0 if spread[2] - spread[1] < spread[1] - spread[0] else 2
+    x, y = (middles @ axes.T[k] for k in range(3) if k != odd)
+    angle, radius = np.arctan2(y, x), np.hypot(x, y)
+    own = np.floor((angle / (2.0 * np.pi) + 0.5) * ANGLES).astype(int) % ANGLES
+    sums = np.bincount(own, weight, ANGLES), np.bincount(own, weight * radius, ANGLES)
+    known = np.flatnonzero(sums[0])
+    profile = sums[1][known] / sums[0][known]
+    profile = np.interp(np.arange(ANGLES), known, profile, period=ANGLES)
+    power = np.abs(np.fft.rfft(profile)[1:]) ** 2
+    count = PATTERN + int(power[PATTERN - 1 :].argmax())
+    if profile.std() < SWING * profile.mean() or not power.any():
+        return 0
+    share = power[count - 1 :: count].sum() / power.sum()
+    return count if share >= PERIODIC else 0
 
 
 def _is_inside(mesh: PartMesh, face: Surface) -> bool:

@@ -5,6 +5,8 @@ import pytest
 from manifold3d import CrossSection, Manifold
 
 from chamberopt.chamber.propose.proposed_target import (
+    BY_SHAPE,
+    BY_SIZE,
     CREASE_DEG,
     crease_deg,
     propose_target,
@@ -47,3 +49,37 @@ def test_facets_that_turn_too_much_for_any_face_are_not_listed() -> None:
 def test_sharp_edges_part_a_plain_part() -> None:
     mesh, _ = part_of(drum(10.0, 20.0))
     assert crease_deg(mesh) == CREASE_DEG
+
+
+def rim(count: int, deep: float) -> np.ndarray:
+    """Corners of the outline of a wheel of 10 mm radius with rounded teeth, (60 count, 2)."""
+    angle = 2.0 * np.pi * np.arange(60 * count) / (60 * count)
+    radius = 10.0 + deep * np.cos(count * angle)
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def toothed(count: int, deep: float) -> Manifold:
+    """A wheel whose rim of teeth, 8 mm wide, is one face, on a hub whose side is larger."""
+    wheel = Manifold.extrude(CrossSection([rim(count, deep)]), 8.0)
+    return wheel + Manifold.cylinder(60.0, 4.0, 4.0, 90)
+
+
+@pytest.mark.parametrize("count", [7, 24])
+@pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [35.0, 70.0, 10.0]])
+def test_a_rim_of_teeth_is_chosen_though_the_hub_is_larger(count: int, turn: list[float]) -> None:
+    mesh, body = part_of(toothed(count, 0.5).rotate(turn))
+    known = surfaces(mesh)
+    largest = propose_target(mesh, known, [known[0].name])
+    target = propose_target(mesh, known, [])
+    assert f"it repeats {count} times round an axis, as teeth do" in target.reason
+    assert target.reason.endswith(BY_SHAPE)
+    assert not (target.triangles & largest.triangles).any()
+    corners = rim(count, 0.5)
+    length = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).sum()
+    assert body.area_faces[target.triangles].sum() == pytest.approx(8.0 * length, rel=1e-4)
+
+
+@pytest.mark.parametrize(("count", "deep"), [(5, 0.5), (24, 0.05)])
+def test_few_lobes_or_shallow_waves_are_no_teeth(count: int, deep: float) -> None:
+    mesh, _ = part_of(toothed(count, deep))
+    assert propose_target(mesh, surfaces(mesh), []).reason.endswith(BY_SIZE)
