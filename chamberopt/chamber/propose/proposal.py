@@ -202,8 +202,17 @@ def with_charge(made: Proposal, factor: float) -> Proposal:
         design=design,
         tables={**made.tables, "shot": {**made.tables["shot"], "mass_g": mass_g}},
         bounds={**made.bounds, "shot.mass_g": _masses(mass_g, ball_mass)._asdict()},
-        warnings=tuple(warnings(design, made.chamber)),
+        warnings=warned_again(made, design, made.chamber),
     )
+
+
+def warned_again(made: Proposal, design: Design, chamber: Chamber) -> tuple[DesignWarning, ...]:
+    """Return the warnings of a proposal whose design or chamber is changed.
+
+    That its floor is wider than any sonotrode, no design tells.
+    """
+    of_floor = (one for one in made.warnings if one.kind == WarningKind.WIDE_FLOOR)
+    return (*of_floor, *warnings(design, chamber))
 
 
 def is_capped(made: Proposal) -> bool:

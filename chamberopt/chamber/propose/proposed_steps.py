@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import Any
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.chamber.checks.check import shot_reach, warnings
+from chamberopt.chamber.checks.check import shot_reach
 from chamberopt.chamber.checks.jams import gaps_in_reach, jam_gaps
 from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.propose.held_proposal import bore_clearance_mm
@@ -27,6 +27,7 @@ from chamberopt.chamber.propose.proposal import (
     sonotrode_area,
     touched_area,
     touched_share,
+    warned_again,
 )
 from chamberopt.chamber.propose.proposed_balls import (
     AS_GOOD,
@@ -351,5 +352,5 @@ def _with_values(made: Proposal, values: Mapping[str, Mapping[str, Any]], steps:
         bounds=holding(made.bounds, design),
         chamber=chamber,
         jams=max(jams, key=len),
-        warnings=tuple(warnings(design, chamber)),
+        warnings=warned_again(made, design, chamber),
     )

@@ -6,9 +6,17 @@ from typing import Any
 
 import pytest
 
+from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.checks.check import warnings
 from chamberopt.chamber.checks.place_names import PART, PART_SIDE
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
-from chamberopt.chamber.propose.proposal import COUNTED, holding, new_harm, propose_tolerances
+from chamberopt.chamber.propose.proposal import (
+    COUNTED,
+    holding,
+    new_harm,
+    propose_tolerances,
+    warned_again,
+)
 from tests.helpers.synthetic import plate_design
 
 
@@ -62,3 +70,13 @@ def test_new_harm_is_told_by_kind_and_subject() -> None:
     ):
         new = new_harm(made, before)
         assert (new and new.beginning) == harm
+
+
+def test_a_changed_proposal_still_warns_of_a_floor_wider_than_any_sonotrode() -> None:
+    """Its design does not tell it, so that it was lost with the first change."""
+    design = plate_design()
+    wide = DesignWarning(WarningKind.WIDE_FLOOR, "chamber: LARGER THAN USUAL SONOTRODES")
+    full = DesignWarning(WarningKind.PACKING, "the balls fill 30% of the free volume")
+    chamber = build_chamber(design)
+    warned = warned_again(found(wide, full), design, chamber)
+    assert warned == (wide, *warnings(design, chamber))
