@@ -9,7 +9,8 @@ export const varied = new Set();
 
 export function makeFields() {
   const groups = new Map(), pose = document.getElementById("pose-fields"), numbers = document.getElementById("numbers");
-  const opened = new Map([...numbers.children].map((group) => [group.id, group.open])), focused = document.activeElement?.id;
+  const opened = new Map([...numbers.querySelectorAll("details")].map((one) => [one.id, one.open])), focused = document.activeElement?.id;
+  const folded = (id, open, summary, title = "") => element("details", { id, open: opened.get(id) ?? open }, element("summary", { textContent: summary, title }));
   rows.clear();
   pose.replaceChildren();
   for (const field of state.fields) {
@@ -18,15 +19,25 @@ export function makeFields() {
     const { table } = field;
     const row = field.choices ? choiceRow(field) : field.suggestions ? nameRow(field) : numberRow(field);
     if (isPose) { pose.append(row); continue; }
-    if (!groups.has(table)) groups.set(table, element("details", { id: `of-${table}`, open: opened.get(`of-${table}`) ?? OPEN.includes(table) }, element("summary", { textContent: field.group, title: `[${table}]` })));
-    groups.get(table).append(row);
+    if (!groups.has(table)) groups.set(table, { group: folded(`of-${table}`, OPEN.includes(table), field.group, `[${table}]`), unset: [] });
+    if (isUnset(field)) groups.get(table).unset.push(row);
+    else groups.get(table).group.append(row);
   }
-  numbers.replaceChildren(...groups.values());
+  for (const [table, { group, unset }] of groups) if (unset.length) {
+    const rest = folded(`unset-of-${table}`, false, `${unset.length} more, not set`);
+    rest.className = "unset";
+    rest.append(...unset);
+    group.append(rest);
+  }
+  numbers.replaceChildren(...[...groups.values()].map(({ group }) => group));
   document.getElementById(focused)?.focus();
   for (const name of varied) if (!rows.has(name)) varied.delete(name);
   document.dispatchEvent(new Event("varied"));
   showValues();
 }
+
+// A number that the design does without is folded away: often the file has another one in its place.
+const isUnset = (field) => !field.choices && !field.suggestions && value(field.name) === null;
 
 // What a number is, in words, and why the file has it; its key is the tip.
 const label = (field) => element("label", { title: `${field.name} in the file`, htmlFor: field.name },
@@ -174,6 +185,6 @@ export function sayAtFields(faults = {}) {
   for (const [name, words] of Object.entries(faults)) {
     const { row } = rows.get(name) ?? rows.get(`${name}.0`) ?? {};
     row?.append(element("p", { className: "wrong", role: "alert" }, ...onPage(words)));
-    row?.closest("details")?.setAttribute("open", "");
+    for (let fold = row?.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
   }
 }

@@ -102,15 +102,16 @@ function dimensions() {
     view.lines(`${name}, lines`, Float32Array.from(lines.flat()), "#56616a", along ? "wall" : "", along);
     view.texts(name, texts, along ? "wall" : "", along);
   };
-  show("box", null, ends, [[b.map((x, i) => short(x - a[i])).join(" × ") + " mm", [0.5 * (a[0] + b[0]), a[1], b[2] + 0.03 * size]]]);
-  show("width", [1, 0, 0], dimension([low[0], low[1], 0], [high[0], low[1], 0], [0, -gap, 0], size),
-    [[`${short(high[0] - low[0])} mm`, [0.5 * (low[0] + high[0]), low[1] - gap, -0.4 * gap]]]);
+  show("box", null, ends, [["part " + b.map((x, i) => short(x - a[i])).join(" × ") + " mm", [0.5 * (a[0] + b[0]), a[1], b[2] + 0.03 * size]]]);
   const across = high[1] - low[1], isRound = value("chamber.shape") !== "box" && Math.abs(high[0] - low[0] - across) < 1e-3 * size;
+  const sign = value("chamber.shape") === "cylinder" ? "⌀ " : "";
+  show("width", [1, 0, 0], dimension([low[0], low[1], 0], [high[0], low[1], 0], [0, -gap, 0], size),
+    [[`${sign}${short(high[0] - low[0])} mm`, [0.5 * (low[0] + high[0]), low[1] - gap, -0.4 * gap]]]);
   show("depth", [0, 1, 0], isRound ? [] : dimension([low[0], low[1], 0], [low[0], high[1], 0], [-gap, 0, 0], size),
     isRound ? [] : [[`${short(across)} mm`, [low[0] - gap, 0.5 * (low[1] + high[1]), -0.4 * gap]]]);
   show("height", upright, [...dimension([high[0], high[1], 0], [high[0], high[1], high[2]], [gap, 0, 0], size),
     ...dimension([b[0], a[1], 0], [b[0], a[1], a[2]], [0, 0, 0], size)],
-  [[`${short(high[2])} mm`, [high[0] + gap, high[1], 0.8 * high[2]]], [`${short(a[2])} mm`, [b[0], a[1], 0.5 * a[2]]]]);
+  [[`height ${short(high[2])} mm`, [high[0] + gap, high[1], 0.8 * high[2]]], [`distance ${short(a[2])} mm`, [b[0], a[1], 0.5 * a[2]]]]);
 }
 
 // Ends of the lines of a dimension between two places: arrows, aside by a way, and a line from each place to its arrow.

@@ -497,6 +497,11 @@ def test_shape_and_holder_are_chosen_in_words(opened: Page) -> None:
     )
     assert drawn == pytest.approx(44, abs=1e-3)
     page.click("#undo")
+    rest = page.locator("#unset-of-sonotrode")
+    expect(rest.locator("summary")).to_contain_text("more, not set")
+    expect(page.locator('[id="sonotrode.amplitude_pv_um"]')).to_be_hidden()
+    rest.locator("summary").click()
+    expect(page.locator('[id="sonotrode.amplitude_pv_um"]')).to_be_visible()
     page.click("#of-holder summary")
     shown("holder.kind").select_option(label="rod on a face")
     expect(shown("holder.axis.2")).to_have_value("1", timeout=WAIT)
@@ -671,7 +676,7 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     expect(page.locator("#progress")).to_contain_text("finished", timeout=WAIT)
     expect(simulate).to_have_text("Simulate")
     assert load_design(folder / "design.toml").process.treatment_time_s == 6
-    expect(page.locator("#lasts")).to_contain_text("about 5 s")
+    expect(page.locator("#lasts")).to_contain_text(re.compile(r"about \d+ s"))
     result = json.loads((folder / "results" / "design" / "result.json").read_text())
     out = folder / "by-command"
     assert main(["simulate", str(folder / "design.toml"), "--no-ranges", "--out", str(out)]) == 0
@@ -690,7 +695,8 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     )
     assert answer < drawn < figures
     shown = page.locator("#shown")
-    expect(shown).to_contain_text("Almen intensity: not known: too few dents were simulated")
+    too_few = "Almen intensity: not known: too few dents were simulated"
+    expect(page.locator("#shown .answer").first).to_contain_text(too_few)  # above the view
     longer = page.locator('[id="process.accuracy.simulated_time_s"]')
     before, times = longer.input_value(), page.locator("#longer").get_attribute("title")
     page.click("#longer")
@@ -715,9 +721,9 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     page.locator("#result-list li", has_text="by-command").locator("input").check()
     page.click("#show-results")
     expect(page.locator("#difference")).to_contain_text("Difference of coverage", timeout=WAIT)
-    expect(page.locator("#difference")).not_to_contain_text("drawing where", timeout=WAIT)
+    drawn = page.locator("#difference img, #difference:has-text('OpenGL')")
+    expect(drawn).to_have_count(1, timeout=WAIT)
     expect(page.locator("#shown .answer")).to_contain_text(re.compile("of both|No difference is"))
-    assert page.locator("#difference img").count() or "OpenGL" in page.text_content("#difference")
     page.locator('[id="shot.mass_g"]').evaluate("one => { one.value = 2.9; }")
     page.locator('[id="shot.mass_g"]').dispatch_event("change")
     expect(page.locator("#stale")).to_contain_text("It had: mass of the shot 3 g", timeout=WAIT)
