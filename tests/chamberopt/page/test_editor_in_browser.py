@@ -694,7 +694,6 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
         for one in ("#shown .answer", "#part-0", "#shown section:last-of-type")
     )
     assert answer < drawn < figures
-    shown = page.locator("#shown")
     too_few = "Almen intensity: not known: too few dents were simulated"
     expect(page.locator("#shown .answer").first).to_contain_text(too_few)  # above the view
     longer = page.locator('[id="process.accuracy.simulated_time_s"]')
