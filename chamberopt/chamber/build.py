@@ -481,17 +481,18 @@ def _room_over_sonotrode(
         return whole.select(kept), []
     largest = rest[int(np.argmax(volumes))]
     low, high = 1e3 * largest.vertices[:, 2].min(), 1e3 * largest.vertices[:, 2].max()
-    many, most = len(rest) > 1, f"{1e6 * max(volumes):.3g} cm³"
-    marked, covers = np.any(left_out, axis=0), np.any([*closing.values(), tags < 0], axis=0)
+    number, marked = len(rest), np.any(left_out, axis=0)
+    size = f"{1e6 * max(volumes):.3g} cm³ between z = {low:.4g} and {high:.4g} mm"
+    covers = np.any([*closing.values(), tags < 0], axis=0)
     if (marked & covers).any() and not (marked & ~covers & (tags != TAG_PART)).any():
         by = " and ".join(name for name, rows in closing.items() if (rows & marked).any())
-        hollows = f"{len(rest)} hollows of the part are" if many else "a hollow of the part is"
-        what = f"{hollows} closed by {by}, {'the largest ' if many else ''}of {most}"
+        hollows = "a hollow" if number == 1 else f"{number} hollows"
+        largest = "" if number == 1 else ", the largest"
+        note = f"closed by {by}: {hollows} of the part{largest} of {size}"
     else:
-        closed = f"{len(rest)} closed rooms, the largest" if many else "a closed room"
-        what = f"{bodies} cuts off {closed} of {most}"
-    note = f"{what} between z = {low:.4g} and {high:.4g} mm: no shot gets there, it is left out"
-    return whole.select(kept), [note]
+        closed = "a closed room" if number == 1 else f"{number} closed rooms, the largest"
+        note = f"{bodies} cuts off {closed} of {size}"
+    return whole.select(kept), [f"{note}: no shot gets there, it is left out"]
 
 
 def _in_words(name: str, design: Design) -> str:

@@ -424,7 +424,7 @@ def test_a_keyway_is_closed_by_the_flanges_of_the_arbor(parts: Path, high: float
     given = design(parts, "keyed", part={"rotate_deg": (90, 0, 0), "target": END}, holder=holder)
     notes = build_chamber(given).notes
     name = "the arbor" if high else "the flanges of the arbor"
-    assert any(note.startswith(f"a hollow of the part is closed by {name}") for note in notes)
+    assert any(note.startswith(f"closed by {name}: a hollow of the part of ") for note in notes)
 
 
 def test_an_arbor_turns_with_the_part_about_its_own_axis(parts: Path) -> None:
