@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 TIME = "time_to_98_s"
 WIDEST_FACE = 90.0  # mm: larger faces need slots or are several (chamber/propose/usual_shop.toml)
 SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wall is named by it
-EDGE, CLAMPED = 5e-5, 1e-3  # m: narrower openings are none; what stands out less is not clamped
+EDGE, CLAMPED = 5e-5, 3e-3  # m: narrower openings are none; jaws take what stands out so far
 JAMMED = 0.01  # least share of the shot's time, or of the impacts, in gaps that is told in red
 
 
@@ -206,7 +206,7 @@ def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Documen
         (),
         [
             Section("Process sheet", content),
-            Section("Limits and warnings", limit_tables(result)),
+            Section("Measurements, limits and warnings", limit_tables(result)),
             Section("Title block", [block]),
         ],
     )
@@ -354,7 +354,9 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
     for number, way in enumerate(openings):
         place = ", ".join(plain(round(1e3 * x, 1) + 0.0) for x in way.place)
         frame = "" if number else " in the chamber's frame"
-        rows.append(("opening", f"{_of_opening(way)} round ({place}) mm{frame}; {_beyond(way)}"))
+        rows.append(
+            ("opening", f"{_of_opening(way)} round ({place}) mm{frame}; {_beyond(way, openings)}")
+        )
     yield from _first(rows, "openings")
     faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
     for name, one in result.record.chamber.fixtures.items():
@@ -385,10 +387,13 @@ def _of_opening(one: Opening) -> str:
     return f"{' × '.join(sides)} mm in {wall}"
 
 
-def _beyond(one: Opening) -> str:
-    if one.beyond < CLAMPED:
+def _beyond(one: Opening, openings: Sequence[Opening]) -> str:
+    """Return in words how far the part stands out of an opening, and whether it is held there."""
+    if one.beyond < EDGE:
         return "the part fills it"
-    return f"the part stands out by {plain(1e3 * one.beyond, 2)} mm: clamp it there"
+    farthest = max(other.beyond for other in openings)
+    clamp = ": clamp it there" if one.beyond >= min(CLAMPED, farthest) else ""
+    return f"the part stands out by {plain(1e3 * one.beyond, 2)} mm{clamp}"
 
 
 def key_row(key: str, value: Any) -> Row:

@@ -104,7 +104,7 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
     openings = (
         Opening("the wall", (0.06, 0.08), (0.0, 0.04, 0.0624), 0.0093, (0.0, 1.0, 0.0)),
         Opening("the wall", (0.012, 0.08), (-0.04, 0.0, 0.0624), 0.0, (-1.0, 0.0, 0.0)),
-        Opening("the ceiling", (0.012, 0.0), (0.0, 0.0, 0.119), 0.02, (0.0, 0.0, 1.0)),
+        Opening("the ceiling", (0.012, 0.0), (0.0, 0.0, 0.119), 0.0012, (0.0, 0.0, 1.0)),
     )
     tables = setting_tables(bore, AsBuilt((50.0,), openings))
     rows = next(one for one in tables if one.caption == "Chamber").rows
@@ -113,7 +113,7 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
         "stands out by 9.3 mm: clamp it there",
         "12 × 80 mm in the wall at −x round (−40, 0, 62.4) mm; the part fills it",
         "12 mm of the ceiling, which ends on the part, round (0, 0, 119) mm; the part stands out "
-        "by 20 mm: clamp it there",
+        "by 1.2 mm",
     ]
     assert dict(rows)["holder"].endswith("0.2 mm of clearance all round")
     assert dict(rows)["gaps"].startswith("round the part as above, of all other joints at most 0.4")
