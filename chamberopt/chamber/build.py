@@ -246,13 +246,17 @@ def _build_one(design: Design, target: np.ndarray | None) -> Chamber:
     cavity, fixtures = with_fixtures(design, part, filled, cavity)
     is_drawn = design.chamber.setup() is not None
     whole = cavity.body.surface()
-    tags = cavity.trace(whole).tags
+    traced = cavity.trace(whole)
+    tags = traced.tags
     if not (tags == TAG_PART).any():
         text = f"{part.name}: no part of it is inside the chamber; "
         raise _misplaced(part, shape, text + _where_to_look(is_drawn))
 
     bodies = f"the part or its {' or '.join(fixtures)}" if fixtures else "the part"
-    room, room_notes = _room_over_sonotrode(whole, tags, bodies)
+    closing = {
+        _in_words(name, design): traced.fitting == one.number for name, one in fixtures.items()
+    }
+    room, room_notes = _room_over_sonotrode(whole, tags, bodies, closing)
     ceiling = float(shape.vertices[:, 2].max())
     at_ceiling = shape.vertices[shape.triangles, 2] >= ceiling - MIN_HEIGHT
     is_level = at_ceiling.all(axis=1).any()  # a holder may hide the tip of a dome, at any height
@@ -384,9 +388,9 @@ def _refuse_free_edges(design: Design, room: SolidSurface, tags: np.ndarray) -> 
     border = find_unwalled_border(room.vertices, room.triangles, is_sonotrode(tags))
     if border is not None:
         raise InputError(
-            f"sonotrode: its face has a free edge at {format_point(border)}: walls must rise from "
-            "it all round, as a moving edge is not supported; let it fill the floor of the room, "
-            "or of a well, from wall to wall"
+            f"sonotrode: its face has a free edge at {format_point(border)} in the chamber's "
+            "frame: walls must rise from it all round, as a moving edge is not supported; let it "
+            "fill the floor of the room, or of a well, from wall to wall"
         )
 
 
@@ -440,14 +444,15 @@ def _refuse_wide_swings(design: Design, mesh: TriangleMesh) -> None:
             given = one.amplitude * one.per_amplitude
             raise InputError(
                 f"{f'sonotrodes.{k - 1}' if k else 'sonotrode'}.{one.amplitude_key}: given "
-                f"{1e6 * given:g}, but at {format_point(place)} the wall {leaning}, where "
-                f"balls of {1e3 * ball:g} mm allow at most {most:g}: a moving edge is not "
-                "supported; lower it, use larger balls, or let the wall rise more steeply"
+                f"{1e6 * given:g}, but at {format_point(place)} in the chamber's frame the wall "
+                f"{leaning}, where balls of {1e3 * ball:g} mm allow at most {most:g}: a "
+                "moving edge is not supported; lower it, use larger balls, or let the "
+                "wall rise more steeply"
             )
 
 
 def _room_over_sonotrode(
-    whole: SolidSurface, tags: np.ndarray, bodies: str
+    whole: SolidSurface, tags: np.ndarray, bodies: str, closing: Mapping[str, np.ndarray]
 ) -> tuple[SolidSurface, list[str]]:
     """Return the surface of the room over the sonotrode, and a note on rooms that were left out.
 
@@ -455,6 +460,7 @@ def _room_over_sonotrode(
         whole: surface of all closed rooms into which the part divides the chamber.
         tags: kind of surface of its triangles (part, sonotrode or wall), (k,).
         bodies: what stands in the chamber, for the note: "the part or its holder".
+        closing: marks of the triangles on each holder or mask, (k,), by its name in words.
     """
     rooms = find_cavities(whole)
     floor = tags == TAG_SONOTRODE
@@ -466,7 +472,8 @@ def _room_over_sonotrode(
     kept = max(
         with_floor, key=lambda room: areas(whole.vertices, whole.triangles[room & floor]).sum()
     )
-    rest = [whole.select(room) for room in rooms if room is not kept]
+    left_out = [room for room in rooms if room is not kept]
+    rest = [whole.select(room) for room in left_out]
     if not rest:
         return whole.select(kept), []
     volumes = [float(tetrahedron_volumes(room.vertices, room.triangles).sum()) for room in rest]
@@ -474,12 +481,26 @@ def _room_over_sonotrode(
         return whole.select(kept), []
     largest = rest[int(np.argmax(volumes))]
     low, high = 1e3 * largest.vertices[:, 2].min(), 1e3 * largest.vertices[:, 2].max()
-    what = "a closed room" if len(rest) == 1 else f"{len(rest)} closed rooms, the largest"
-    note = (
-        f"{bodies} cuts off {what} of {1e6 * max(volumes):.3g} cm³ between z = {low:.4g} and "
-        f"{high:.4g} mm: no shot gets there, it is left out"
-    )
-    return whole.select(kept), [note]
+    number, marked = len(rest), np.any(left_out, axis=0)
+    size = f"{1e6 * max(volumes):.3g} cm³ between z = {low:.4g} and {high:.4g} mm"
+    covers = np.any([*closing.values(), tags < 0], axis=0)
+    if (marked & covers).any() and not (marked & ~covers & (tags != TAG_PART)).any():
+        by = " and ".join(name for name, rows in closing.items() if (rows & marked).any())
+        hollows = "a hollow" if number == 1 else f"{number} hollows"
+        largest = "" if number == 1 else ", the largest"
+        note = f"closed by {by}: {hollows} of the part{largest} of {size}"
+    else:
+        closed = "a closed room" if number == 1 else f"{number} closed rooms, the largest"
+        note = f"{bodies} cuts off {closed} of {size}"
+    return whole.select(kept), [f"{note}: no shot gets there, it is left out"]
+
+
+def _in_words(name: str, design: Design) -> str:
+    """Return a holder or a mask in words, by that of it which may close a hollow of the part."""
+    holder = design.holder
+    if name != "holder" or holder is None or holder.kind != "arbor":
+        return f"the {name}"
+    return "the arbor" if holder.thickness_mm is None else "the flanges of the arbor"
 
 
 def _ceiling_notes(room: SolidSurface, ceiling: float, key: str, bodies: str) -> list[str]:

@@ -206,8 +206,8 @@ def _require_touch(
         place = format_point(part.vertices[part.triangles[first]].mean(axis=0))
         raise InputError(
             f"holder.at: the holder covers {1e6 * on_target.sum():.3g} mm² of the target, most on "
-            f"triangle {part.elements[first]} near {place}; clamp other faces, make the holder "
-            "smaller, or leave these faces out of [part.target]"
+            f"triangle {part.elements[first]} near {place} in the chamber's frame; clamp "
+            "other faces, make the holder smaller, or leave these faces out of [part.target]"
         )
 
 
@@ -382,9 +382,9 @@ def _way_out(
     if not leaving[0]:
         place = format_point(np.round(starts[0], 9) + 0.0)
         raise InputError(
-            f"holder.axis: from {place}, in the middle of the faces that it clamps, no wall is met "
-            "along this way; give faces inside the room, and the way out of it in the chamber's "
-            "frame"
+            f"holder.axis: from {place} in the chamber's frame, in the middle of the faces that it "
+            "clamps, no wall is met along this way; give faces inside the room, and the way out of "
+            "it in that frame"
         )
     return float(distance[0]), float(distance[leaving].max()) + DEPTH_IN_ROOM
 
@@ -517,9 +517,9 @@ def _plugs(part: Part, chosen: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]
         if not is_hole(vertices, triangles):
             first = part.elements[piece[0]]
             raise InputError(
-                f"mask.plugs: the faces of mask.at near {format_point(vertices.mean(axis=0))} "
-                f"(triangle {first}) are no walls of a hole; leave them out, or give "
-                "mask.thickness_mm"
+                f"mask.plugs: the faces of mask.at near {format_point(vertices.mean(axis=0))} in "
+                f"the chamber's frame (triangle {first}) are no walls of a hole; leave them out, "
+                "or give mask.thickness_mm"
             )
         hull = trimesh.convex.convex_hull(vertices - _offsets(vertices, triangles, SINK))
         plugs.append((np.asarray(hull.vertices), np.asarray(hull.faces)))

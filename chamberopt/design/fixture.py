@@ -21,6 +21,12 @@ SINK, LEAST_GAP_MM = 0.01, 0.1
 TIGHT_GAP, WIDEST_GAP = math.sqrt(1.0 - (1.0 - SINK) ** 2), 0.5
 USUAL_SHELL_MM = 1.0
 
+
+def tight_gap_mm(ball_mm: float) -> float:
+    """Return the widest gap [mm] of a joint that counts as none for balls of a diameter [mm]."""
+    return max(math.floor(100.0 * TIGHT_GAP * ball_mm) / 100.0, LEAST_GAP_MM)
+
+
 # The keys that each kind of holder may have beside `axis`.
 HOLDER_KEYS = {
     "rod": ("at", "diameter_mm"),

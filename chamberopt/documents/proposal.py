@@ -10,10 +10,11 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.checks.fillets import OF_FILLET, OF_SLOT
+from chamberopt.chamber.propose.first_design import START
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.proposed_target import area_in_mm2
 from chamberopt.chamber.propose.text import TO_SETTLE, clauses, to_settle
@@ -21,6 +22,7 @@ from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import in_words
 from chamberopt.common.number_text import plain, rounded
 from chamberopt.documents.document import Table
+from chamberopt.geometry.triangles import areas
 from chamberopt.peening.strip import StripSize
 from chamberopt.peening.strip_holder import why_no_strip
 
@@ -123,7 +125,7 @@ def proposal_in_words(made: Proposal, left_out: Sequence[LeftOut]) -> ProposalIn
         tuple(rows),
         _trials(made) if made.trials else None,
         tuple(matter_of(text) for text in to_settle(made, left_out)),
-        tuple(_choice(one, one.name == target) for one in made.known),
+        tuple(_choice(_as_simulated(one, made), one.name == target) for one in made.known),
     )
 
 
@@ -164,6 +166,24 @@ def choices_of(known: Sequence[Surface]) -> list[Choice]:
     return [_choice(one, False) for one in known]
 
 
+def _as_simulated(one: Surface, made: Proposal) -> Surface:
+    """Return a surface, with its area as it is simulated if it is the whole target of a proposal.
+
+    Rounds that are divided along the surface behind their facets are a little larger.
+    """
+    if made.tables["part.target"] != one.keys or made.settings > 1:
+        return one
+    mesh = made.mesh
+    told = area_in_mm2(float(areas(mesh.vertices, mesh.triangles)[one.triangles].sum()))
+    return replace(one, text=one.text.replace(told, area_in_mm2(_target_area(made))))
+
+
+def _target_area(made: Proposal) -> float:
+    """Return the area of the target as it is simulated [m²]."""
+    part = made.chamber.part
+    return float(part.area[part.target].sum())
+
+
 def _choice(one: Surface, is_target: bool) -> Choice:
     place = str(one.keys["faces"][0]["at_mm"]) if "faces" in one.keys else ""
     return Choice(one_line(one.name), one.text, place, one.alone, is_target)
@@ -177,7 +197,8 @@ def choice_lines(choices: Sequence[Choice], most: int) -> list[str]:
         alone = f"; {one.alone}" if one.alone else ""
         lines += wrapped(f"  {one.name}: {one.text}{place}{alone}", 4)
     more = [f"  and {len(choices) - most} more: --target pick"] if len(choices) > most else []
-    return ["Surfaces to choose from (--target):", *lines, *more]
+    frame = ", places in the part's file" if any(one.place for one in choices[:most]) else ""
+    return [f"Surfaces to choose from (--target){frame}:", *lines, *more]
 
 
 def time_in_words(seconds: float) -> str:
@@ -191,16 +212,22 @@ def time_in_words(seconds: float) -> str:
 
 def _sentence(made: Proposal) -> str:
     """Return what is proposed in one sentence."""
-    design, part = made.design, made.chamber.part
+    design = made.design
     balls = " and then ".join(_balls(made))
-    area = area_in_mm2(float(part.area[part.target].sum()))
+    area = area_in_mm2(_target_area(made))
     strips = f", in each of {made.settings} settings" if made.settings > 1 else ""
     return (
         f"Peen {one_line(_target(made))} ({area}{strips}) of "
-        f"{one_line(design.part.mesh_path.name)} for "
-        f"{time_in_words(design.process.treatment_time)} with {balls}, the sonotrode at "
+        f"{one_line(design.part.mesh_path.name)} for {_time(made)} with {balls}, the sonotrode at "
         f"{design.sonotrode.zero_to_peak_um:g} µm zero-to-peak."
     )
+
+
+def _time(made: Proposal) -> str:
+    """Return the treatment time in words, and that it is a start where no pilot told it."""
+    is_start = made.reasons.get("process.treatment_time_s", "").startswith(START)
+    time = time_in_words(made.design.process.treatment_time)
+    return f"{time} (a start)" if is_start else time
 
 
 def _target(made: Proposal) -> str:
@@ -239,8 +266,7 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
             yield name, value or next(iter(whys), "see the design"), keys
     balls = ", then ".join(_balls(made))
     yield "balls", balls, ("shot.diameter_mm", "shot.mass_g", "shot.material")
-    time = time_in_words(design.process.treatment_time)
-    yield "time", time, ("process.treatment_time_s", "process.coverage_percent")
+    yield "time", _time(made), ("process.treatment_time_s", "process.coverage_percent")
     if ".steps" in made.reasons:
         yield "steps", made.reasons[".steps"].partition(": ")[0], (".steps",)
     if INTENSITY in made.reasons:

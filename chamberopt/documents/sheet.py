@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.fixture import size_in_words
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.key_words import in_words, key_in_words, title_with_unit, unit_of
 from chamberopt.common.number_text import estimate_text, percent
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.calibration import why_no_intensity
-from chamberopt.design.fixture import LEAST_GAP_MM, TIGHT_GAP, WIDEST_GAP
+from chamberopt.design.fixture import WIDEST_GAP, tight_gap_mm
 from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.materials import alloys, find
 from chamberopt.design.tolerances import USUAL, USUAL_IN_WORDS, tolerance_box
@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 
 TIME = "time_to_98_s"
 WIDEST_FACE = 90.0  # mm: larger faces need slots or are several (chamber/propose/usual_shop.toml)
+SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wall is named by it
+EDGE, CLAMPED = 5e-5, 3e-3  # m: narrower openings are none; jaws take what stands out so far
 JAMMED = 0.01  # least share of the shot's time, or of the impacts, in gaps that is told in red
 
 
@@ -204,7 +206,7 @@ def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Documen
         (),
         [
             Section("Process sheet", content),
-            Section("Limits and warnings", limit_tables(result)),
+            Section("Measurements, limits and warnings", limit_tables(result)),
             Section("Title block", [block]),
         ],
     )
@@ -326,9 +328,11 @@ def _chamber(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
             yield what, f"{len(several)}: see the report"
     yield from _fixtures(result, openings)
     ball = 1e3 * min(result.design.ball_diameters)
-    widest = f"{plain(max(math.floor(100.0 * TIGHT_GAP * ball) / 100.0, LEAST_GAP_MM))} mm"
+    holder = result.design.holder
+    in_bore = holder is not None and holder.clearance_mm > 0.0
+    places = "round the part as above, of all other joints" if in_bore else "of joints and openings"
     slit = f"round the sonotrode at most {plain(WIDEST_GAP * ball, 2)} mm"
-    yield "gaps", f"of joints and openings at most {widest}, or sealed; {slit}"
+    yield "gaps", f"{places} at most {plain(tight_gap_mm(ball))} mm, or sealed; {slit}"
     if volume := result.record.chamber.volume_mm3:
         yield "free volume", f"{plain(1e-3 * volume)} cm³"
 
@@ -347,11 +351,12 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
         out = "the mask clamps it" if padded else "the part goes out through the wall"
         yield "holder", f"none: {out}{'' if padded else '; clamp it there'}"
     rows = []
-    for way in openings:
-        sides, place = ([plain(round(1e3 * x, 1) + 0.0) for x in t] for t in (way.size, way.place))
-        out = f"the part stands out by {plain(1e3 * way.beyond, 2)} mm: clamp it there"
-        text = f"{' × '.join(sides)} mm in {way.wall} round ({', '.join(place)}) mm; {out}"
-        rows.append(("opening", text))
+    for number, way in enumerate(openings):
+        place = ", ".join(plain(round(1e3 * x, 1) + 0.0) for x in way.place)
+        frame = "" if number else " in the chamber's frame"
+        rows.append(
+            ("opening", f"{_of_opening(way)} round ({place}) mm{frame}; {_beyond(way, openings)}")
+        )
     yield from _first(rows, "openings")
     faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
     for name, one in result.record.chamber.fixtures.items():
@@ -369,6 +374,26 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
         chosen = faces[name]
         where = f" ({', '.join(chosen.surface)})" if chosen and chosen.surface != ("all",) else ""
         yield name, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part{where}"
+
+
+def _of_opening(one: Opening) -> str:
+    """Return in words how large an opening is, and in which wall."""
+    sides = [plain(round(1e3 * x, 1) + 0.0) for x in one.size]
+    ways = zip("xyz", one.way, strict=True)
+    at = next((f" at {'+−'[x < 0.0]}{axis}" for axis, x in ways if abs(x) > SQUARE), "")
+    wall = one.wall if one.wall == CEILING else f"{one.wall}{at}"
+    if min(one.size) < EDGE:
+        return f"{sides[int(np.argmax(one.size))]} mm of {wall}, which ends on the part,"
+    return f"{' × '.join(sides)} mm in {wall}"
+
+
+def _beyond(one: Opening, openings: Sequence[Opening]) -> str:
+    """Return in words how far the part stands out of an opening, and whether it is held there."""
+    if one.beyond < EDGE:
+        return "the part fills it"
+    farthest = max(other.beyond for other in openings)
+    clamp = ": clamp it there" if one.beyond >= min(CLAMPED, farthest) else ""
+    return f"the part stands out by {plain(1e3 * one.beyond, 2)} mm{clamp}"
 
 
 def key_row(key: str, value: Any) -> Row:
@@ -548,14 +573,16 @@ def _checks(result: Result) -> Iterator[Row]:
         laws = {name: getattr(design.materials, name) for name in ("sonotrode", "wall", "part")}
         what = f"ball drop: one ball at {plain(DROP_SPEED)} m/s, speed after over speed before"
         yield what, ", ".join(f"{k} {_restitution(x)}" for k, x in laws.items())
-    curve = result.record.coverage_against_time
-    # Measuring tells most near a mean coverage of 0.5.
+    curve, end = result.record.coverage_against_time, design.process.treatment_time
+    # Measuring tells most near a mean coverage of 0.5. A part is peened no longer than it is to be.
     row = min(curve, key=lambda row: abs(row.mean_coverage - 0.5), default=None)
+    share, after = result.metrics["mean_coverage"], f"the peening time, {plain(end, 3)} s"
     # If the mean coverage at the end is not resolved, its curve is not reliable either.
-    if row and result.metrics["mean_coverage"].has_number:
-        share = Estimate(row.mean_coverage, row.half_width)
-        what = f"mean coverage of the target after {plain(row.time_s, 3)} s"
-        yield what, estimate_text(share, 100.0, "%")
+    if row and share.has_number:
+        if row.time_s < end:
+            share = Estimate(row.mean_coverage, row.half_width)
+            after = f"{plain(row.time_s, 3)} s"
+        yield f"mean coverage of the target after {after}", estimate_text(share, 100.0, "%")
     intensity = result.metrics.get("almen_intensity")
     if intensity is None:
         strips = "A strips at 4 or 5 times, for chamberopt calibrate"

@@ -1,6 +1,7 @@
 """Lay the process sheet out on A4 pages and write it as PDF.
 
-All of it is on one page if that can be read, else limits and warnings go on further pages.
+All of it is on one page if that can be read, else what is measured first, limits and warnings go on
+further pages.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ SHEET_FILE = PageFile("process sheet", (".pdf",), lambda content: CREATOR.encode
 WIDTH, HEIGHT, MARGIN, GAP = 210.0, 297.0, 12.0, 6.0  # mm
 INNER = WIDTH - 2.0 * MARGIN
 SIZES = (8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0)  # pt of the text; the largest size that fits is used
-LEAST_ALONE = 6.5  # pt: with smaller letters on one page, limits and warnings get further pages
+LEAST_ALONE = 6.5  # pt: with smaller letters than these on one page there are further pages
 # Height of the drawing with its caption [mm]: the least for each pt of the text, and the most.
 DRAWING_PER_PT, MOST_DRAWING = 13.0, 125.0
 CAPTION, ROW = 7.0, 8.0  # mm, of the caption, and of a row of the title block
@@ -274,7 +275,8 @@ def draw_sheet(
     content = [one for one in first.content if one not in red]
     whole = [*content, *further.content]
     top = _heading(axes, first.title, sheet, red)
-    texts = (whole, content, top - FOOT)
+    settings = [one for one in content if isinstance(one, Table) and not one.head]
+    texts = (whole, settings, top - FOOT)
     _, _, _, room = _laid_out(*texts, [DRAWING_PER_PT * size for size in SIZES])
     # A drawing of that scale is lower than its room: with less room the letters may be larger.
     tall = drawing_height(chamber, (INNER, min(MOST_DRAWING, room) - CAPTION))
@@ -284,7 +286,8 @@ def draw_sheet(
     Writer(axes, 6.0).write(f"{views}, {LEGEND}", MARGIN, top - tall, INNER, colour=DARK_GREY)
     _content(Writer(axes, size, most), shown, top - tall - CAPTION)
     if not alone:
-        pages += _further_pages(further, sheet.name)
+        measured = [one for one in content if one not in settings]
+        pages += _further_pages(further, measured, sheet.name)
     for number, one in enumerate(pages, 1):
         (fields,) = block.content
         assert isinstance(fields, Table)
@@ -345,30 +348,40 @@ def _heading(axes: Axes, title: str, sheet: Document, red: Sequence[Sentence]) -
     return y
 
 
-def _further_pages(section: Section, name: str) -> Iterator[Axes]:
+def _further_pages(section: Section, measured: Sequence[Block], name: str) -> Iterator[Axes]:
     """Yield pages with the tables of a section, one below the other, as wide as the page.
 
     A page is not finished before the next one is asked for.
+
+    Args:
+        measured: what stands above them on the first of these pages.
     """
-    measure, y, write = Writer(None, SIZES[0], ALL_LINES), FOOT, Writer(None, SIZES[0])
+    axes, y = _further_page(section.title, name)
+    yield axes
+    measure, write = Writer(None, SIZES[0], ALL_LINES), Writer(axes, SIZES[0], ALL_LINES)
+    if measured:
+        y = _content(Writer(axes, SIZES[0]), measured, y) - 0.8 * write.line
     for table in section.content:
         assert isinstance(table, Table)
         names, caption = measure.names(table, INNER), table.caption
         for row in table.rows:
             head = -measure.caption(caption, MARGIN, 0.0, INNER) if caption else 0.0
             if y - head + measure.row(row, MARGIN, 0.0, INNER, names) <= FOOT:
-                axes = _page()
+                axes, y = _further_page(section.title, name)
                 yield axes
                 write, caption = Writer(axes, SIZES[0], ALL_LINES), table.caption
-                y = Writer(axes, 12.0).write(
-                    section.title, MARGIN, HEIGHT - MARGIN, 80.0, bold=True
-                )
-                beside, width = MARGIN + 82.0, INNER - 82.0
-                y = min(y, Writer(axes, 9.0).write(name, beside, HEIGHT - MARGIN, width)) - 3.0
             if caption:
                 y, caption = write.caption(caption, MARGIN, y, INNER), ""
             y = write.row(row, MARGIN, y, INNER, names) - 0.3 * write.line
         y -= 0.8 * write.line
+
+
+def _further_page(title: str, name: str) -> tuple[Axes, float]:
+    """Return a new page with its heading, and the height of the heading's bottom [mm]."""
+    axes = _page()
+    y = Writer(axes, 12.0).write(title, MARGIN, HEIGHT - MARGIN, 96.0, bold=True)
+    beside, width = MARGIN + 98.0, INNER - 98.0
+    return axes, min(y, Writer(axes, 9.0).write(name, beside, HEIGHT - MARGIN, width)) - 3.0
 
 
 def _content(write: Writer, content: Sequence[Block], top: float) -> float:

@@ -58,7 +58,8 @@ def find_resting_balls(
     verb = "lies" if len(resting) == 1 else "lie"
     return RestingBalls(
         len(resting) / balls,
-        f"{len(resting)} of {balls} balls {verb} still at the end: {'; '.join(descriptions)}",
+        f"{len(resting)} of {balls} balls {verb} still at the end, places in the chamber's frame: "
+        f"{'; '.join(descriptions)}",
     )
 
 

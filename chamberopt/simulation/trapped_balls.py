@@ -152,7 +152,8 @@ def trapped_notes(found: Sequence[TrappedBalls], design: Design) -> tuple[str, .
     if mean and (jammed := jammed_text(mean, design)):
         worst = max(found, key=lambda one: (one.rattling_impacts, one.rattling_time))
         notes.append(
-            f"{jammed}; e.g. {worst.place}; give another shot.diameter_mm than the gap, or close it"
+            f"{jammed}; e.g. {worst.place} in the chamber's frame; give another "
+            "shot.diameter_mm than the gap, or close it"
         )
     return tuple(notes)
 

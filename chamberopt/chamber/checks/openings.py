@@ -1,12 +1,13 @@
-"""Find where the part goes out of its chamber: openings of the wall, in which it is clamped."""
+"""Find where the part goes out of its chamber: openings of walls, in which it is clamped."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.checks.place_names import CEILING, surface_names
+from chamberopt.chamber.checks.place_names import SIDE_WALL, surface_names
 from chamberopt.design.shape_surface import TAG_PART
 from chamberopt.geometry.triangles import (
     area_vectors,
@@ -21,11 +22,12 @@ if TYPE_CHECKING:
 
 
 THIN = 5e-5  # m: sides of openings below it are none
-SAME_SIDE = 0.7  # cosine between walls that an edge and one inside it lie in
+BEND_DEG = 30.0  # walls that turn by less into each other are one, as facets of a cylinder
+LEAST_WAY = 0.05  # length of the mean unit normal below which a wall looks no way
 
 
 class Opening(NamedTuple):
-    """An opening of the wall, filled by the part that goes out through it."""
+    """An opening of a wall, filled by the part that goes out through it."""
 
     wall: str  # "the ceiling" or "the wall"
     size: tuple[float, float]  # of the box round it in the wall, level side first [m]
@@ -34,10 +36,22 @@ class Opening(NamedTuple):
     way: tuple[float, float, float]  # unit vector square to the wall, outwards
 
 
-def find_openings(chamber: Chamber) -> list[Opening]:
-    """Return the openings of a chamber's wall through which the part goes out, the largest first.
+class Joint(NamedTuple):
+    """Sides of triangles of walls along which the part goes on."""
 
-    An edge inside another, as of a hollow part, is no opening of its own.
+    ends: np.ndarray  # vertices at both ends of each side, in the order of its triangle, (j, 2)
+    out: np.ndarray  # unit normal of its triangle, out of the cavity, (j, 3)
+
+    def select(self, chosen: np.ndarray) -> Joint:
+        """Return the chosen sides, marked by (j,) bool."""
+        return Joint(self.ends[chosen], self.out[chosen])
+
+
+def find_openings(chamber: Chamber) -> list[Opening]:
+    """Return the openings of a chamber's walls through which the part goes out, the largest first.
+
+    One that goes on over the edge between two walls is an opening of each. A hole of the part that
+    a wall closes, as the bore of a pipe, is none.
     """
     vertices, triangles = chamber.vertices, chamber.triangles
     names, on_part = surface_names(chamber), chamber.tags == TAG_PART
@@ -48,42 +62,67 @@ def find_openings(chamber: Chamber) -> list[Opening]:
     meets = np.isin(edges, edges[np.repeat(on_part, 3)])
     found: list[Opening] = []
     for wall in np.unique(names[~on_part & ~fixed & (chamber.source < 0)]):
-        joint = np.flatnonzero(meets & np.repeat((names == wall) & ~on_part & ~fixed, 3))
-        ends = sides_of(triangles)[joint]
-        used, numbers = np.unique(ends, return_inverse=True)
-        one, two = numbers.reshape(-1, 2).T
-        piece = connected_pieces(one, two, len(used))[1] if len(used) else used
-        loops = []
-        edges_only: dict[tuple[float, ...], np.ndarray] = {}  # by the direction of their wall
-        for own in (piece[one] == k for k in set(piece)):
-            loop = _opening(chamber, wall, outward, joint, own)
-            if min(loop.size) > THIN:
-                loops.append(loop)
-            else:  # where a part as wide as the chamber ends it, of which other sides meet no wall
-                key = tuple(np.round(_out(outward, joint, own), 3))
-                edges_only[key] = edges_only.get(key, False) | own
-        loops += [_opening(chamber, wall, outward, joint, own) for own in edges_only.values()]
-        loops.sort(key=lambda opening: -np.prod(opening.size))
-        for loop in loops:
-            if not any(_is_inside(loop, other) for other in found if other.wall == wall):
-                found.append(loop)
+        sides = np.flatnonzero(meets & np.repeat((names == wall) & ~on_part & ~fixed, 3))
+        joint = Joint(sides_of(triangles)[sides], outward[sides // 3])
+        lines: dict[tuple[float, ...], list[Joint]] = {}  # by the direction of their wall
+        for loop in _loops(joint):
+            if _is_hole_of_part(vertices, loop):
+                continue
+            for own in _on_each_wall(loop):
+                one = _opening(chamber, wall, own)
+                if one is not None and min(one.size) > THIN:
+                    found.append(one)
+                elif one is not None:  # a side of the part, as wide as the wall, which it ends
+                    lines.setdefault(tuple(np.round(one.way, 3)), []).append(own)
+        for several in lines.values():
+            one = _opening(chamber, wall, Joint(*map(np.concatenate, zip(*several, strict=True))))
+            found += [] if one is None else [one]
     return sorted(found, key=lambda opening: -np.prod(opening.size))
 
 
-def _opening(
-    chamber: Chamber, wall: str, outward: np.ndarray, joint: np.ndarray, own: np.ndarray
-) -> Opening:
-    """Return the opening round which some sides of the chamber's triangles lie.
+def _loops(joint: Joint) -> Iterator[Joint]:
+    """Yield the sides of a joint that hang together, as those round one opening."""
+    used, numbers = np.unique(joint.ends, return_inverse=True)
+    one, two = numbers.reshape(-1, 2).T
+    count, piece = connected_pieces(one, two, len(used))
+    yield from (joint.select(piece[one] == number) for number in range(count))
+
+
+def _on_each_wall(loop: Joint) -> Iterator[Joint]:
+    """Yield the sides of a loop on each wall: on one side of a box, or all round a cylinder."""
+    ways, numbers = np.unique(np.round(loop.out, 6), axis=0, return_inverse=True)
+    one, two = np.nonzero(ways @ ways.T > np.cos(np.radians(BEND_DEG)))
+    count, wall = connected_pieces(one, two, len(ways))
+    yield from (loop.select(wall[numbers.reshape(-1)] == number) for number in range(count))
+
+
+def _is_hole_of_part(vertices: np.ndarray, loop: Joint) -> bool:
+    """Return whether the wall lies inside a loop, and the part round it.
+
+    The sides then go round the way out of the room by the right hand, as those of the triangles of
+    the wall do. A loop that ends at the edge of its wall is closed by a straight line.
+    """
+    places, times = np.unique(loop.ends, return_counts=True)
+    start = vertices[places[np.argmin(times)]]  # an end of an open one
+    one, two = (vertices[loop.ends[:, k]] - start for k in (0, 1))
+    length = np.linalg.norm(two - one, axis=1)
+    inside = np.cross(one, two).sum(axis=0) @ (length @ loop.out)
+    return bool(inside > THIN**2 * length.sum())
+
+
+def _opening(chamber: Chamber, wall: str, own: Joint) -> Opening | None:
+    """Return the opening of a wall round which some sides lie; None if they lie all round a room.
 
     Args:
-        outward: unit normal of each triangle, out of the cavity, (k, 3).
-        joint: numbers of the sides where the part meets a wall, (j,).
-        own: marks those of the opening, (j,).
+        own: the sides of the wall's triangles where it meets the part.
     """
-    points = chamber.vertices[sides_of(chamber.triangles)[joint[own]].reshape(-1)]
+    points = chamber.vertices[own.ends.reshape(-1)]
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    out = _out(outward, joint, own)
-    if wall == CEILING:
+    out = own.out.mean(axis=0)
+    if np.linalg.norm(out) < LEAST_WAY:
+        return None
+    out /= np.linalg.norm(out)
+    if wall != SIDE_WALL:
         size = np.ptp(points[:, :2], axis=0)
     else:
         level = np.array([-out[1], out[0], 0.0]) / np.hypot(out[0], out[1])
@@ -91,16 +130,3 @@ def _opening(
     beyond = float(((chamber.part.vertices - middle) @ out).max())
     (x, y, z), (u, v, w) = middle.tolist(), out.tolist()
     return Opening(wall, (float(size[0]), float(size[1])), (x, y, z), beyond, (u, v, w))
-
-
-def _out(outward: np.ndarray, joint: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Return the mean unit normal (3,) of the wall beside sides of triangles, as of `_opening`."""
-    out = outward[joint[own] // 3].sum(axis=0)
-    return np.asarray(out / np.linalg.norm(out))
-
-
-def _is_inside(one: Opening, other: Opening) -> bool:
-    """Return whether an opening lies in the box round a larger one on the same side."""
-    away = np.linalg.norm(np.subtract(one.place, other.place))
-    is_near = 2.0 * away < max(other.size) and np.dot(one.way, other.way) > SAME_SIDE
-    return bool(is_near and min(one.size) < min(other.size))

@@ -57,7 +57,7 @@ def tight_gaps(chamber: Chamber, diameters: Sequence[float]) -> Iterator[TightGa
             one, two = sides
             yield TightGap(
                 sides,
-                f"the gap between {one} and {two} at {one_of(gap.centre, gap.area)} is "
-                f"{max(0.0, low):.3g} to {high:.3g} mm wide, where a ball of {1e3 * largest:g} mm "
-                "jams or does not get in",
+                f"the gap between {one} and {two} at {one_of(gap.centre, gap.area)} in the "
+                f"chamber's frame is {max(0.0, low):.3g} to {high:.3g} mm wide, where a ball of "
+                f"{1e3 * largest:g} mm jams or does not get in",
             )

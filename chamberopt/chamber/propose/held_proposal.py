@@ -45,10 +45,11 @@ from chamberopt.chamber.propose.proposed_target import (
 from chamberopt.chamber.propose.shop import Shop
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import Progress
-from chamberopt.design.fixture import USUAL_SHELL_MM, WIDEST_GAP
+from chamberopt.design.fixture import USUAL_SHELL_MM, WIDEST_GAP, tight_gap_mm
 from chamberopt.geometry.faces import Faces
 
 MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
+ROUNDING = 1e-9  # of a clearance over its step
 SEEN_OUT = 1e-3  # m by which a part stands out of a side
 MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area over the largest
 # Flat faces looked at for jaws; least area of each [m²]; of two, share of all that stands out, and
@@ -119,9 +120,11 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
 def bore_clearance_mm(ball: float) -> float:
     """Return the clearance of a bore [mm] in which no ball of a diameter [m] wedges.
 
-    As the part may lie against one side of its bore, it is a quarter of a ball at most.
+    It is no wider than a sheet allows of joints. As the part may lie against one side of its bore,
+    it is a quarter of a ball at most, which is less for the finest balls alone.
     """
-    return min(MILLED_MM, math.floor(1e4 * WIDEST_GAP * ball) / 20.0)
+    most = min(tight_gap_mm(1e3 * ball), 500.0 * WIDEST_GAP * ball)
+    return min(MILLED_MM, math.floor(20.0 * most + ROUNDING) / 20.0)
 
 
 def _outside_in_words(made: Proposal) -> str:

@@ -15,6 +15,7 @@ from chamberopt.cli.options import Json, Out, Verbose, app
 from chamberopt.common.errors import one_line
 
 if TYPE_CHECKING:
+    from chamberopt.chamber.propose.proposal import Proposal
     from chamberopt.chamber.propose.proposed_target import Surface
 
 PICK = "pick"  # in the place of names of surfaces
@@ -94,6 +95,7 @@ def new(
     from chamberopt.common.files import claim_folder
     from chamberopt.common.progress import tell_program
     from chamberopt.documents.proposal import proposal_in_words, proposal_lines
+    from chamberopt.geometry.meshes.surface_error import SurfaceError
     from chamberopt.geometry.meshes.units import STATED, UnknownUnitError
     from chamberopt.printers.terminal import text
     from chamberopt.workflows.propose import (
@@ -124,6 +126,13 @@ def new(
             picked.append(_picked(known))
         return picked[0]
 
+    def first_proposal() -> Proposal:
+        try:
+            return propose(part, wanted, choose)
+        except SurfaceError as error:
+            error.__notes__.clear()  # they tell how to see the faults by a design, which is not yet
+            raise
+
     out = out or Path(part.stem if part.suffix else f"{part.name}_chamber")
     with claim_folder(out):
         pass  # reports a folder that is taken before the work begins
@@ -132,13 +141,13 @@ def new(
         with stages(teller, pilot) as begin:
             if PICK not in target:  # which asks below the lines of steps
                 begin(SIZES)
-            made = propose(part, wanted, choose)
+            made = first_proposal()
     except UnknownUnitError as error:
         if not sys.stdin.isatty():
             raise
         wanted = replace(wanted, unit=_asked_unit(part, error.sizes))
         wishes = replace(wishes, geometry=wanted)
-        made = propose(part, wanted, choose)
+        made = first_proposal()
 
     if pilot:  # which take minutes, and may change it
 

@@ -266,7 +266,7 @@ def test_a_rod_may_come_from_a_side_wall(parts: Path, facing: tuple[float, ...])
         ("box", {"holder": {"kind": "rod", "at": {"box_mm": ((90, 0, 0), (91, 1, 1))}}},
          r"holder\.at: chooses none of the 12 triangles"),
         ("box", {"holder": {"kind": "bore"}}, r"holder\.kind: given \"bore\", but .* no wall"),
-        ("shaft", {"holder": {"kind": "rod"}}, r"holder\.axis: from \(0, 0, 75\) mm, .* no wall"),
+        ("shaft", {"holder": {"kind": "rod"}}, r"holder\.axis: from \(0, 0, 75\) mm in .* no wall"),
         ("box", {"holder": {"kind": "collar"}}, r"holder\.grip_mm: missing: .* level"),
         ("box", {"holder": {"kind": "rod", "grip_mm": 3.0}}, r'holder\.grip_mm: not of kind "rod"'),
         ("box", {"holder": {"kind": "plate", "size_mm": (0.0, 5.0)}}, r"holder\.size_mm: given"),
@@ -404,6 +404,27 @@ def test_an_arbor_fills_its_hole_and_goes_out(
     one = chamber.fixtures["holder"]
     assert one.size == pytest.approx((4.002e-3,), rel=1e-6)
     assert 1e3 * one.length == pytest.approx(8 + outside, abs=2 * SUNK)
+
+
+@pytest.mark.parametrize("high", [None, 1.0])  # mm: of the keyway; None: all through
+def test_a_keyway_is_closed_by_the_flanges_of_the_arbor(parts: Path, high: float | None) -> None:
+    drill = trimesh.creation.cylinder(2.0, 20.0, sections=64)
+    key = trimesh.creation.box((1.0, 3.0, 20.0))
+    key.apply_translation((0.0, 1.5, 0.0))
+    holes = [drill, key]
+    for one in holes:
+        one.apply_translation((-5.0, 0.0, 0.0))
+    if high is not None:  # a blind one, and the arbor alone closes it
+        holes[1] = trimesh.creation.box((1.0, 3.0, high))
+        holes[1].apply_translation((-5.0, 1.5, 0.0))
+    body = trimesh.boolean.difference([trimesh.creation.box(BOX), *holes], engine="manifold")
+    body.export(parts / "keyed.stl")
+    flanges = {} if high else {"diameter_mm": 8.0, "thickness_mm": 2.0}
+    holder = {"kind": "arbor", "at": THROUGH, "axis": (0, 1, 0), "both_sides": True, **flanges}
+    given = design(parts, "keyed", part={"rotate_deg": (90, 0, 0), "target": END}, holder=holder)
+    notes = build_chamber(given).notes
+    name = "the arbor" if high else "the flanges of the arbor"
+    assert any(note.startswith(f"closed by {name}: a hollow of the part of ") for note in notes)
 
 
 def test_an_arbor_turns_with_the_part_about_its_own_axis(parts: Path) -> None:

@@ -246,6 +246,19 @@ def test_a_unit_that_cannot_be_known_is_asked_for(
         assert said in shown.err
 
 
+def test_a_part_that_crosses_itself_is_not_to_be_seen_by_a_design_that_is_not_there(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ring = trimesh.creation.torus(10.0, 3.0, major_sections=32, minor_sections=16)
+    ring.vertices[:, 2] *= np.where(ring.vertices[:, 0] > 9.0, -1.0, 1.0)  # a part is turned over
+    ring.export("ring.stl")
+    assert main(["new", "ring.stl", "--unit", "mm"]) == 2
+    shown = capfd.readouterr().err
+    assert "the surface crosses itself" in shown
+    assert "FILE.toml" not in shown
+
+
 def test_a_pilot_that_cannot_run_leaves_the_starts_and_says_so(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -39,6 +39,24 @@ def test_all_that_is_to_be_settled_is_one_list(made: Proposal) -> None:
     assert max(map(len, text.splitlines())) <= WIDTH
 
 
+def test_the_target_has_one_area_and_a_time_that_no_pilot_told_is_a_start(made: Proposal) -> None:
+    """Rounds that are divided make it larger than in the file."""
+    part = replace(made.chamber.part, area=1.01 * made.chamber.part.area)
+    larger = replace(made, chamber=replace(made.chamber, part=part))
+    told = proposal_in_words(larger, [])
+    area = f"{1e6 * part.area[part.target].sum():.0f} mm²"
+    assert f"face 1 ({area}) of box.stl for 5 min (a start) with" in told.sentence
+    assert next(one.value for one in told.rows if one.name == "time") == "5 min (a start)"
+    (target,) = (one for one in told.choices if one.is_target)
+    assert target.text.endswith(f", {area} in all") or target.text == area
+    assert "Surfaces to choose from (--target), places in the part's file:" in proposal_lines(
+        told, verbose=False
+    )
+    of_pilot = {**made.reasons, "process.treatment_time_s": "an estimate"}
+    told = proposal_in_words(replace(made, reasons=of_pilot), [])
+    assert "for 5 min with" in told.sentence
+
+
 def test_balls_that_are_many_are_told_with_what_pilots_say_of_larger_ones(made: Proposal) -> None:
     ball = made.tables["shot"]["diameter_mm"]
     assert not any("MANY" in one.mark for one in proposal_in_words(made, []).matters)

@@ -14,9 +14,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.checks.openings import Opening
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
+from chamberopt.common.number_text import estimate_text
 from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.design.sonotrode import Face
 from chamberopt.documents.coverage import figures
@@ -32,7 +34,7 @@ from chamberopt.documents.sheet import (
     setting_tables,
     title_block,
 )
-from chamberopt.documents.wording import metric_label
+from chamberopt.documents.wording import metric_label, plain
 from chamberopt.peening.tolerance_result import ToleranceResult, ToleratedFigure
 from chamberopt.pictures.part_drawing import draw_chamber, drawing_height
 from chamberopt.pictures.section import cut, face_size_mm, inside, section_planes
@@ -95,6 +97,29 @@ def test_its_figures_are_those_of_the_report(folder: Path) -> None:
     assert "Simulated without friction" in rows_of(smooth)["Not in these figures"][""]
 
 
+def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
+    result = load_result(folder)
+    held = result.design.changed({"holder": {"kind": "bore", "clearance_mm": 0.2}})
+    bore = replace(result, design=held)
+    openings = (
+        Opening("the wall", (0.06, 0.08), (0.0, 0.04, 0.0624), 0.0093, (0.0, 1.0, 0.0)),
+        Opening("the wall", (0.012, 0.08), (-0.04, 0.0, 0.0624), 0.0, (-1.0, 0.0, 0.0)),
+        Opening("the ceiling", (0.012, 0.0), (0.0, 0.0, 0.119), 0.0012, (0.0, 0.0, 1.0)),
+    )
+    tables = setting_tables(bore, AsBuilt((50.0,), openings))
+    rows = next(one for one in tables if one.caption == "Chamber").rows
+    assert [text for name, text in rows if name == "opening"] == [
+        "60 × 80 mm in the wall at +y round (0, 40, 62.4) mm in the chamber's frame; the part "
+        "stands out by 9.3 mm: clamp it there",
+        "12 × 80 mm in the wall at −x round (−40, 0, 62.4) mm; the part fills it",
+        "12 mm of the ceiling, which ends on the part, round (0, 0, 119) mm; the part stands out "
+        "by 1.2 mm",
+    ]
+    assert dict(rows)["holder"].endswith("0.2 mm of clearance all round")
+    assert dict(rows)["gaps"].startswith("round the part as above, of all other joints at most 0.4")
+    assert rows_of(result)["Chamber"]["gaps"].startswith("of joints and openings at most 0.42 mm")
+
+
 def test_what_the_best_costs_is_on_the_sheet(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     result = load_result(folder)
     speed = result.metrics["mean_normal_speed_m_s"]
@@ -112,8 +137,16 @@ def test_what_to_measure_first_without_a_calibration(folder: Path) -> None:
     assert checks["ball"].startswith("sonotrode 0.7")
     assert checks["A"].startswith("not known before")  # no strips, no intensity
     curve = load_result(folder).record.coverage_against_time
-    nearest = min(curve, key=lambda row: abs(row.mean_coverage - 0.5)).mean_coverage
-    assert float(checks["mean"].split()[0]) == pytest.approx(100.0 * nearest, abs=0.5)
+    nearest = min(curve, key=lambda row: abs(row.mean_coverage - 0.5))
+    share = 100.0 * nearest.mean_coverage
+    longer = load_result(folder)
+    longer = replace(longer, design=longer.design.changed({"process.treatment_time_s": 1e6}))
+    what, expected = next(x for x in first_checks(longer).rows if x[0].startswith("mean"))[:2]
+    assert what == f"mean coverage of the target after {plain(nearest.time_s, 3)} s"
+    assert float(expected.split()[0]) == pytest.approx(share, abs=0.5)
+    at_end = estimate_text(load_result(folder).metrics["mean_coverage"], 100.0, "%")
+    assert nearest.time_s > 5.0  # half of it is covered later: no part is peened so long
+    assert (rows[2][0].split("after ")[1], checks["mean"]) == ("the peening time, 5 s", at_end)
     few = load_result(folder)
     few.metrics["mean_coverage"] = Estimate(0.5, math.inf, in_words="not resolved")
     names = {what.split()[0] for what, *_ in first_checks(few).rows}

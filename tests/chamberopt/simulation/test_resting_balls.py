@@ -59,7 +59,7 @@ def test_groups_say_how_many_on_what_and_where(chamber: Chamber) -> None:
     assert found is not None
     assert found.share == 0.025
     assert found.line == (
-        "5 of 200 balls lie still at the end: "
+        "5 of 200 balls lie still at the end, places in the chamber's frame: "
         "3 on the part's upper side around (-1.5, 0.0, 6.4) mm, the longest since 0.41 s; "
         "1 jammed between the part's side and the wall at (8.5, 0.0, 0.0) mm, since 0.20 s; "
         "1 on a ledge of the wall at (-5.0, -5.0, -8.5) mm, since -0.10 s"

@@ -103,8 +103,8 @@ def test_a_rattling_ball_is_counted_and_its_gap_named(chamber: Chamber) -> None:
         "0.67 of 10 balls are held or rattle in gaps hardly wider than themselves, the longest "
         "one for 0.67 of 2 s: the shot loses 3.3 % of its time, and 32 % of all impacts on the "
         "part are those of held balls, which count in no figure; e.g. between the part's side "
-        "and the wall, around (8.5, 0.0, 0.0) mm; give another shot.diameter_mm than the gap, or "
-        "close it"
+        "and the wall, around (8.5, 0.0, 0.0) mm in the chamber's frame; give another "
+        "shot.diameter_mm than the gap, or close it"
     )
     turned = find_trapped_balls(result(520, two), 2.0, chamber, part_turns=True)
     assert turned.place == "at the wall, around (8.5, 0.0, 0.0) mm"

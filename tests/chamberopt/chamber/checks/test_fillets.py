@@ -8,7 +8,7 @@ import trimesh
 from scipy.spatial import Delaunay
 
 from chamberopt.chamber.checks.check import shot_reach
-from chamberopt.chamber.checks.fillets import fillet_warnings, inner_edges
+from chamberopt.chamber.checks.fillets import facet_warnings, fillet_warnings, inner_edges
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from tests.helpers.synthetic import chamber_round
 
@@ -61,3 +61,23 @@ def test_shot_of_more_than_half_a_fillet_or_a_quarter_of_a_slot_is_warned_of() -
     assert [one for one in warned(slot, 1.4e-3) if one.kind is WarningKind.SLOT] == []
     (said,) = (one for one in warned(slot, 1.6e-3) if one.kind is WarningKind.SLOT)
     assert "quarter of the target's narrowest slot, about 6.01 mm wide" in said.text  # 6 by design
+
+
+@pytest.mark.parametrize(
+    ("turn", "reachable", "told"),
+    [
+        (16.0, 1.0, None),
+        (16.0, 0.9996, None),
+        (30.0, 1.0, "they look up to 15 degrees aside of a round"),
+        (16.0, 0.93, "touches 93.0% of the target, by the curvature of its rounds up to 100.0%"),
+    ],
+)
+def test_facets_are_warned_of_where_they_tell_of_the_coverage(
+    turn: float, reachable: float, told: str | None
+) -> None:
+    facts = SimpleNamespace(
+        coarse_turn=np.radians(turn), coarse_share=0.25, noisy_share=0.0, crossing_share=0.0
+    )
+    part = SimpleNamespace(smoothing=facts, hollow=None)
+    warned = facet_warnings(part, 1e-3, reachable)  # type: ignore[arg-type]
+    assert [told is not None and told in one.text for one in warned] == [True] * (told is not None)

@@ -72,3 +72,33 @@ def test_a_pipe_has_one_opening_and_a_part_in_the_air_none(tmp_path: Path) -> No
     assert 1e3 * np.array(one.size) == pytest.approx([16, 16], abs=0.05)
     assert 1e3 * one.beyond == pytest.approx(15 + 60 - 40)
     assert find_openings(chamber_of(tmp_path, trimesh.creation.box((20, 12, 8)))) == []
+
+
+def test_a_part_over_an_edge_between_walls_has_an_opening_in_each(tmp_path: Path) -> None:
+    """A bar of 30 x 20 x 8 mm round the corner at x = 30, y = 25 mm."""
+    corner = chamber_of(tmp_path, trimesh.creation.box((30, 20, 8)), offset_mm=(25.0, 20.0))
+    beside, end = find_openings(corner)
+
+    assert 1e3 * np.array([*beside.size, *beside.place]) == pytest.approx([20, 8, 20, 25, 19])
+    assert 1e3 * np.array([*end.size, *end.place]) == pytest.approx([15, 8, 30, 17.5, 19])
+    assert (beside.way, end.way) == (pytest.approx((0, 1, 0)), pytest.approx((1, 0, 0)))
+    assert 1e3 * np.array([beside.beyond, end.beyond]) == pytest.approx([5, 10])
+
+
+def test_holes_of_a_part_in_the_plane_of_a_wall_are_no_openings(tmp_path: Path) -> None:
+    """A plate over the corner, with a hole in its end, near the edge of the opening there."""
+    hole = trimesh.creation.cylinder(1.5, 40.0, sections=24)
+    hole.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (0, 1, 0)))
+    hole.apply_translation((0, -8, 4))
+    plate = trimesh.boolean.difference(
+        [trimesh.creation.box((30, 20, 16)), hole], engine="manifold"
+    )
+    for offset, want in (((25.0, 0.0), [[20, 16]]), ((25.0, 20.0), [[20, 16], [15, 16]])):
+        found = find_openings(chamber_of(tmp_path, plate, offset_mm=offset))
+        assert [[*1e3 * np.array(one.size)] for one in found] == [pytest.approx(x) for x in want]
+
+
+def test_a_lid_wider_than_its_chamber_ends_all_walls(tmp_path: Path) -> None:
+    lines = find_openings(chamber_of(tmp_path, trimesh.creation.box((80, 70, 40))))
+    assert sorted(1e3 * max(one.size) for one in lines) == pytest.approx([50, 50, 60, 60])
+    assert all(min(one.size) < 1e-9 for one in lines)

@@ -11,13 +11,14 @@ from manifold3d import CrossSection, Manifold, OpType
 
 from chamberopt.chamber.propose import held_proposal
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.held_proposal import _flat_jaws
+from chamberopt.chamber.propose.held_proposal import _flat_jaws, bore_clearance_mm
 from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.propose.proposed_end import bare_end, held_end
 from chamberopt.chamber.propose.proposed_holder import HolderChoice, end_holder, holder_choices
 from chamberopt.chamber.propose.proposed_mask import find_left_out
 from chamberopt.chamber.propose.proposed_target import WHOLE, Surface, Target, apart
 from chamberopt.chamber.propose.text import clauses, design_text
+from chamberopt.design.fixture import tight_gap_mm
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
 
@@ -360,3 +361,13 @@ def test_a_body_is_not_named_beside_its_faces() -> None:
     told = [(surface(name), float(one.sum()), one) for name, one in each.items()]
     assert [(one.name, size) for one, size in apart(told)] == [("FRONT", 4.0), ("REAR", 3.0)]
     assert apart([]) == []
+
+
+@pytest.mark.parametrize(
+    ("ball_mm", "clearance"),
+    [(0.3, 0.05), (0.5, 0.1), (0.7, 0.1), (1.0, 0.1), (1.5, 0.2), (4, 0.2)],
+)
+def test_a_wall_is_cut_out_no_wider_than_its_sheet_allows(ball_mm: float, clearance: float) -> None:
+    given = bore_clearance_mm(1e-3 * ball_mm)
+    assert given == clearance
+    assert given <= min(tight_gap_mm(ball_mm), 0.25 * ball_mm)
