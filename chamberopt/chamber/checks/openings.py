@@ -69,15 +69,19 @@ def find_walls_in_holes(chamber: Chamber) -> list[WallInHole]:
     found = []
     for number in np.unique(piece[joint // 3]):
         own = piece[joint // 3] == number
+        sides = ends[joint[own]]
+        along = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1)
+        corners = sides.reshape(-1, 3)
+        middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+        to_middle = unit_vectors(middle - sides.mean(axis=1))
+        # The part's faces round a hole look to its middle. Normals point out of the cavity.
+        facing = -np.einsum("ij,ij->i", to_middle, outward[on_joint[own] // 3])
+        if along @ facing <= HOLLOW * along.sum():
+            continue
         walls = np.flatnonzero(piece == number)
         largest = walls[np.linalg.norm(vectors[walls], axis=1).argmax()]
         opening = _opening(chamber, names[largest], outward, joint, own)
-        sides = ends[joint[own]]
-        along = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1)
-        to_middle = unit_vectors(np.array(opening.place) - sides.mean(axis=1))
-        # The part's faces round a hole look to its middle. Normals point out of the cavity.
-        facing = -np.einsum("ij,ij->i", to_middle, outward[on_joint[own] // 3])
-        if min(opening.size) > THIN and along @ facing > HOLLOW * along.sum():
+        if min(opening.size) > THIN:
             found.append(WallInHole(opening, np.unique(chamber.source[on_joint[own] // 3])))
     return sorted(found, key=lambda hole: -np.prod(hole.opening.size))
 

@@ -254,11 +254,7 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
         found.append(LeftOut({}, text))
     if proposal.strips and (text := unlike_settings(proposal, proposal.strips)):
         found.append(LeftOut({}, text))
-    beside = [one for one in proposal.known if not np.any(one.triangles & target)]
-    names = {one.name for one in [*beside, *_bodies_of(proposal, target, beside)]}
-    others = [one for one in proposal.known if one.name in names]
-    found += _met_beside(proposal, others[:MOST_LOOKED_AT], float(area[target].sum()))
-    return found
+    return [*found, *met_beside(proposal, target)]
 
 
 def unlike_settings(proposal: Proposal, strips: Strips) -> str:
@@ -388,33 +384,36 @@ def _bodies_of(
             yield one
 
 
-def _met_beside(
-    proposal: Proposal, others: Sequence[Surface], target_area: float
-) -> Iterator[LeftOut]:
+def met_beside(proposal: Proposal, target: np.ndarray) -> Iterator[LeftOut]:
     """Yield what the shot meets of the part beside its target, the largest surfaces by name.
 
     The area of what is not named is told too.
 
     Args:
-        target_area: area of the target [m²].
+        target: marks the triangles of the target in the part's file, (m,).
     """
     design, chamber = proposal.design, proposal.chamber
+    beside = [one for one in proposal.known if not np.any(one.triangles & target)]
+    choices = {one.name for one in [*beside, *_bodies_of(proposal, target, beside)]}
+    others = [one for one in proposal.known if one.name in choices][:MOST_LOOKED_AT]
+    target_area = float(areas(proposal.mesh.vertices, proposal.mesh.triangles)[target].sum())
     keys = {key: one for key, one in proposal.tables["part.target"].items() if key in KINDS}
-    target = chamber.part.target | rows_of(design, keys)  # with what was left out of it
-    bare = np.where(target, 0.0, chamber.exposed_area)
+    aimed = chamber.part.target | rows_of(design, keys)  # with what was left out of it
+    bare = np.where(aimed, 0.0, chamber.exposed_area)
     found, wholes, rows = [], {}, {}
     for one in named_or_all(others):
         own = rows[one.name] = rows_of(design, one.keys)
-        inside, wholes[one.name] = float(bare[own].sum()), float(chamber.part.area[own].sum())
+        wholes[one.name] = float(chamber.part.area[own & ~aimed].sum())
+        inside = float(bare[own].sum())
         if inside > min(MET * wholes[one.name], PARTLY_MET * target_area):
             found.append((one, inside, np.where(own, bare, 0.0)))
     met = [(one, inside, wholes[one.name]) for one, inside in apart(found)]
     met.sort(key=lambda one: not RUNNING.search(one[0].name))
-    named, names = np.zeros_like(target), []
+    named, names = np.zeros_like(aimed), []
     for one, inside, whole in met[:MOST_NAMED]:
         named |= rows[one.name]
-        rest_of = "the rest of " if np.any(rows[one.name] & target) else ""
-        of_it = "" if rest_of or inside > NEARLY_ALL * whole else " of it"
+        rest_of = "the rest of " if np.any(rows[one.name] & aimed) else ""
+        of_it = "" if inside > NEARLY_ALL * whole else " of it"
         names.append(f"{rest_of}{one.name} ({area_in_mm2(inside)}{of_it})")
     text = ", ".join(names)
     if (rest := float(bare[~named].sum())) > LEAST * target_area:

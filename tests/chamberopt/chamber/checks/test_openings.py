@@ -8,7 +8,7 @@ import trimesh
 from shapely import Polygon
 
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.openings import find_openings
+from chamberopt.chamber.checks.openings import find_openings, find_walls_in_holes, part_at_wall
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
 
@@ -72,3 +72,63 @@ def test_a_pipe_has_one_opening_and_a_part_in_the_air_none(tmp_path: Path) -> No
     assert 1e3 * np.array(one.size) == pytest.approx([16, 16], abs=0.05)
     assert 1e3 * one.beyond == pytest.approx(15 + 60 - 40)
     assert find_openings(chamber_of(tmp_path, trimesh.creation.box((20, 12, 8)))) == []
+
+
+def drilled(body: trimesh.Trimesh, radius: float, middle: tuple, axis: int) -> trimesh.Trimesh:
+    """A body with a hole through it along an axis, 0 to 2."""
+    drill = trimesh.creation.cylinder(radius, 200.0, sections=64)
+    ends = np.zeros((4, 4))
+    ends[[0, 1, 2, 3], [(axis + 1) % 3, (axis + 2) % 3, axis, 3]] = 1.0
+    drill.apply_transform(ends.T)
+    drill.apply_translation(middle)
+    return trimesh.boolean.difference([body, drill], engine="manifold")
+
+
+def test_the_ceiling_stands_in_the_bore_of_a_tube(tmp_path: Path) -> None:
+    """Open at the sonotrode, the wall stands in it; closed there, no ball gets into it."""
+    tube = trimesh.creation.annulus(6.0, 8.0, 60.0, sections=64)
+    chamber = chamber_of(tmp_path, tube)
+    (hole,) = find_walls_in_holes(chamber)
+    assert hole.opening.wall == "the ceiling"
+    place = [*hole.opening.size, *hole.opening.place]
+    assert 1e3 * np.array(place) == pytest.approx([12, 12, 0, 0, 40], abs=0.05)
+    middles = 1e3 * chamber.part.vertices[chamber.part.triangles].mean(axis=1)
+    inner = np.hypot(*middles.T[:2]) < 6.5
+    assert inner[hole.beside].all()
+    assert {*hole.beside} < {*np.flatnonzero(part_at_wall(chamber))}  # the outside meets it too
+
+    plate = trimesh.creation.cylinder(8.0, 2.0, sections=64)
+    plate.apply_translation((0, 0, -29))
+    closed = trimesh.boolean.union([tube, plate], engine="manifold")
+    assert find_walls_in_holes(chamber_of(tmp_path, closed)) == []
+
+
+def test_the_wall_stands_in_the_holes_of_a_plate_that_it_crosses(tmp_path: Path) -> None:
+    """The wall, at y = 25 mm, is 0.2 mm deep in a plate with two holes; a third one is beside."""
+    plate = trimesh.creation.box(bounds=((-29, 24.8, -10), (29, 34.8, 10)))
+    foot = trimesh.creation.box(bounds=((-3, 0, -10), (3, 30, -8)))
+    body = trimesh.boolean.union([plate, foot], engine="manifold")
+    for x, radius in ((-15, 4.0), (15, 2.5)):
+        body = drilled(body, radius, (x, 0, 0), 1)
+    body = drilled(body, 1.0, (0, 5, 0), 2)
+    large, small = find_walls_in_holes(chamber_of(tmp_path, body, offset_mm=(0, 17.4)))
+    for hole, wide in ((large, 8.0), (small, 5.0)):
+        assert hole.opening.wall == "the wall"
+        assert 1e3 * np.array(hole.opening.size) == pytest.approx([wide, wide], rel=5e-3)
+        assert 1e3 * hole.opening.place[1] == pytest.approx(25.0, abs=1e-6)
+
+
+def test_the_wall_above_a_plate_that_divides_the_room_is_in_no_hole(tmp_path: Path) -> None:
+    """Balls get through its hole to the walls above it, which are not in the hole."""
+    plate = drilled(trimesh.creation.box((70, 60, 4)), 3.0, (0, 0, 0), 2)
+    assert find_walls_in_holes(chamber_of(tmp_path, plate)) == []
+
+
+def test_a_hole_along_the_wall_meets_it_beside_its_mouths(tmp_path: Path) -> None:
+    bar = drilled(trimesh.creation.box((100, 12, 8)), 2.5, (30, 0, 0), 2)
+    chamber = chamber_of(tmp_path, bar)
+    assert find_walls_in_holes(chamber) == []
+    part = chamber.part
+    in_hole = np.hypot(*(1e3 * part.vertices - [30, 0, 0])[:, :2].T) < 2.6
+    rows = in_hole[part.triangles].all(axis=1) & (np.abs(part.corner_normals[:, 0, 2]) < 0.1)
+    assert part_at_wall(chamber)[rows].any()
