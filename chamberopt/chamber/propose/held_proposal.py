@@ -243,9 +243,10 @@ def masked(bare: Proposal, floor: Floor, bores: Sequence[Bore], shop: Shop | Non
         counts = Counter(f"{2e3 * one.radius:.3g}" for one in holes)
         sizes = ", ".join(f"{k} x {size}" if k > 1 else size for size, k in counts.items())
         named = "not to be peened, or " if fits else ""
+        what = "plugs in holes" if len(holes) > 1 else "a plug in the hole"
         text = (
-            f"{'plugs in holes' if len(holes) > 1 else 'a plug in the hole'} of {sizes} mm, {named}which the "
-            "wall crosses: from the rims up to the wall, so that no ball leaves there"
+            f"{what} of {sizes} mm, {named}which the wall crosses: from the rims up to the wall, "
+            "so that no ball leaves there"
         )
         keys: dict[str, Any] = {"plugs": True, "at": {"faces": [one.wall for one in holes]}}
     elif runs:

@@ -74,14 +74,17 @@ def test_a_pipe_has_one_opening_and_a_part_in_the_air_none(tmp_path: Path) -> No
     assert find_openings(chamber_of(tmp_path, trimesh.creation.box((20, 12, 8)))) == []
 
 
-def drilled(body: trimesh.Trimesh, radius: float, middle: tuple, axis: int) -> trimesh.Trimesh:
+def drilled(
+    body: trimesh.Trimesh, radius: float, middle: tuple[float, ...], axis: int
+) -> trimesh.Trimesh:
     """A body with a hole through it along an axis, 0 to 2."""
     drill = trimesh.creation.cylinder(radius, 200.0, sections=64)
     ends = np.zeros((4, 4))
     ends[[0, 1, 2, 3], [(axis + 1) % 3, (axis + 2) % 3, axis, 3]] = 1.0
     drill.apply_transform(ends.T)
     drill.apply_translation(middle)
-    return trimesh.boolean.difference([body, drill], engine="manifold")
+    left: trimesh.Trimesh = trimesh.boolean.difference([body, drill], engine="manifold")
+    return left
 
 
 def test_the_ceiling_stands_in_the_bore_of_a_tube(tmp_path: Path) -> None:
