@@ -127,7 +127,10 @@ def find_openings(chamber: Chamber) -> list[Opening]:
     names, on_part = surface_names(chamber), chamber.tags == TAG_PART
     fixed = _on_fixtures(chamber)
     edges, outward = edge_keys(triangles), unit_vectors(area_vectors(vertices, triangles))
-    meets = np.isin(edges, edges[np.repeat(on_part, 3)])
+    filled = on_part  # with the plugs of its holes, which go out through the wall with it
+    if (mask := chamber.fixtures.get("mask")) is not None and mask.kind == "plugs":
+        filled = on_part | chamber.on_fixture("mask")
+    meets = np.isin(edges, edges[np.repeat(filled, 3)])
     found: list[Opening] = []
     for wall in np.unique(names[~on_part & ~fixed & (chamber.source < 0)]):
         joint = np.flatnonzero(meets & np.repeat((names == wall) & ~on_part & ~fixed, 3))

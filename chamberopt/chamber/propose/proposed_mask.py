@@ -128,10 +128,7 @@ def to_be_plugged(
 
 def open_holes(proposal: Proposal) -> str:
     """Return in words which holes of the part the wall crosses without a plug; "" if none."""
-    design, words = proposal.design, []
-    bores = find_bores(
-        proposal.mesh, np.zeros(len(proposal.mesh.triangles), dtype=bool), for_arbor=False
-    )
+    design, words, bores = proposal.design, [], None
     for room in _rooms(proposal.chamber):
         told = np.zeros(len(room.part.triangles), dtype=bool)
         for hole in find_walls_in_holes(room):
@@ -145,6 +142,9 @@ def open_holes(proposal: Proposal) -> str:
         at_wall = part_at_wall(room)
         if not at_wall.any():
             continue
+        if bores is None:
+            nothing = np.zeros(len(proposal.mesh.triangles), dtype=bool)
+            bores = find_bores(proposal.mesh, nothing, for_arbor=False)
         for bore in bores:  # those beside whose mouth the wall goes on, so that none stands alone
             rows = rows_of(design, {"faces": [bore.wall]})
             if (rows & at_wall).any() and not (rows & told).any():

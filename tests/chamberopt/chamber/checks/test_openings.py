@@ -15,15 +15,23 @@ from chamberopt.design.load import load_design
 DESIGNS = Path(__file__).resolve().parents[4] / "designs"
 
 
-def chamber_of(folder: Path, body: trimesh.Trimesh, **part: object) -> Chamber:
-    """A body in mm, 15 mm over the floor of a box of 60 x 50 x 40 mm; its underside is peened."""
+def chamber_of(
+    folder: Path, body: trimesh.Trimesh, plugs: dict[str, object] | None = None, **part: object
+) -> Chamber:
+    """A body in mm, 15 mm over the floor of a box of 60 x 50 x 40 mm; its underside is peened.
+
+    Args:
+        plugs: keys that choose the walls of holes that are plugged.
+    """
     body.export(folder / "body.stl")
     data = load_design(DESIGNS / "gear.toml").model_dump()
     down = {"direction": (0, 0, -1), "angle_deg": (0, 30)}
     given = {"mesh": str(folder / "body.stl"), "unit": "mm", "target": down, "smoothing": "off"}
     sizes = {"length_mm": 60.0, "width_mm": 50.0, "height_mm": 40.0, "sonotrode_distance_mm": 15.0}
     chamber = {"shape": "box", **sizes}
-    return build_chamber(validate(Design, {**data, "part": {**given, **part}, "chamber": chamber}))
+    mask = None if plugs is None else {"plugs": True, "at": plugs}
+    own = {"part": {**given, **part}, "chamber": chamber, "mask": mask}
+    return build_chamber(validate(Design, {**data, **own}))
 
 
 def test_a_bar_through_both_side_walls_and_a_post_through_the_ceiling(tmp_path: Path) -> None:
@@ -135,3 +143,10 @@ def test_a_hole_along_the_wall_meets_it_beside_its_mouths(tmp_path: Path) -> Non
     in_hole = np.hypot(*(1e3 * part.vertices - [30, 0, 0])[:, :2].T) < 2.6
     rows = in_hole[part.triangles].all(axis=1) & (np.abs(part.corner_normals[:, 0, 2]) < 0.1)
     assert part_at_wall(chamber)[rows].any()
+
+    assert len([one for one in find_openings(chamber) if one.place[0] > 0.0]) == 2  # beside it
+    wall: dict[str, object] = {"faces": [{"at_mm": (27.5, 0.0, 0.0), "crease_deg": 30.0}]}
+    plugged = chamber_of(tmp_path, bar, wall)
+    assert not part_at_wall(plugged)[rows].any()
+    (whole,) = (one for one in find_openings(plugged) if one.place[0] > 0.0)
+    assert 1e3 * np.array(whole.size) == pytest.approx([12, 8], abs=1e-6)
