@@ -285,7 +285,9 @@ def test_what_is_seldom_peened_is_named_or_masked(tmp_path: Path, side: str) -> 
     sharp, said = left_out
     assert sharp.text.startswith("SHARP EDGES, 80 mm of the target's outer edges")
     assert made.design.mask is None
-    assert said.text.startswith("NOT MASKED: the shot also meets FLANGE")
+    assert said.text.startswith(
+        "NOT MASKED: the shot also meets SIDES (1080 mm² of it), FLANGE (360 mm² of it);"
+    )
     assert said.text in tomllib.loads(text)["to_settle"]
 
 
