@@ -1,4 +1,7 @@
-"""Find where the part goes out of its chamber: openings of walls, in which it is clamped."""
+"""Find where the part goes out of its chamber: openings of walls, in which it is clamped.
+
+Where a wall crosses a hole of the part, a piece of the wall stands in the hole.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.checks.place_names import SIDE_WALL, surface_names
-from chamberopt.design.shape_surface import TAG_PART
+from chamberopt.design.shape_surface import TAG_PART, TAG_WALL
 from chamberopt.geometry.triangles import (
     area_vectors,
     connected_pieces,
     edge_keys,
+    side_pairs,
     sides_of,
     unit_vectors,
 )
@@ -24,6 +28,9 @@ if TYPE_CHECKING:
 THIN = 5e-5  # m: sides of openings below it are none
 BEND_DEG = 30.0  # walls that turn by less into each other are one, as facets of a cylinder
 LEAST_WAY = 0.05  # length of the mean unit normal below which a wall looks no way
+# Mean cosine between the way to the middle and the normals of the part round a piece of the wall,
+# from which on it stands in a hole: round a part that divides the room it is 0.
+HOLLOW = 0.2
 
 
 class Opening(NamedTuple):
@@ -47,6 +54,86 @@ class Joint(NamedTuple):
         return Joint(self.ends[chosen], self.out[chosen])
 
 
+class WallInHole(NamedTuple):
+    """A piece of the wall that stands by itself in a hole of the part, round which is the part."""
+
+    opening: Opening  # its place and size, like those of an opening
+    beside: np.ndarray  # numbers of the part's triangles that it meets
+
+
+def find_walls_in_holes(chamber: Chamber) -> list[WallInHole]:
+    """Return the pieces of a chamber's wall that stand in holes of the part, the largest first.
+
+    A hole that a holder or a mask fills has none.
+    """
+    triangles, on_part = chamber.triangles, chamber.tags == TAG_PART
+    one, two = side_pairs(triangles).T
+    beside = ~on_part[one // 3] & ~on_part[two // 3]
+    piece = connected_pieces(one[beside] // 3, two[beside] // 3, len(triangles))[1]
+    # The wall round the room is in one piece with a sonotrode, or with what holds the part.
+    is_other = on_part | (chamber.tags != TAG_WALL) | _on_fixtures(chamber)
+    alone = ~np.isin(piece, piece[is_other])
+    if not alone.any():
+        return []
+    off, on = _sides_at_part(one, two, on_part)
+    off, on = off[alone[off // 3]], on[alone[off // 3]]
+    names, vectors = surface_names(chamber), area_vectors(chamber.vertices, triangles)
+    outward, ends = unit_vectors(vectors), sides_of(triangles)
+    found = []
+    for number in np.unique(piece[off // 3]):
+        own = piece[off // 3] == number
+        joint = Joint(ends[off[own]], outward[off[own] // 3])
+        sides = chamber.vertices[joint.ends]
+        along = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1)
+        corners = sides.reshape(-1, 3)
+        middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+        to_middle = unit_vectors(middle - sides.mean(axis=1))
+        # The part's faces round a hole look to its middle. Normals point out of the cavity.
+        facing = -np.einsum("ij,ij->i", to_middle, outward[on[own] // 3])
+        if along @ facing <= HOLLOW * along.sum():
+            continue
+        walls = np.flatnonzero(piece == number)
+        largest = walls[np.linalg.norm(vectors[walls], axis=1).argmax()]
+        opening = _opening(chamber, names[largest], joint)
+        if opening is not None and min(opening.size) > THIN:
+            found.append(WallInHole(opening, np.unique(chamber.source[on[own] // 3])))
+    return sorted(found, key=lambda hole: -np.prod(hole.opening.size))
+
+
+def part_at_wall(chamber: Chamber) -> np.ndarray:
+    """Mark the part's triangles that meet the wall, but not those that a holder or mask meets."""
+    one, two = side_pairs(chamber.triangles).T
+    off, on = _sides_at_part(one, two, chamber.tags == TAG_PART)
+    is_wall = (chamber.tags == TAG_WALL) & ~_on_fixtures(chamber)
+    marked = np.zeros(len(chamber.part.triangles), dtype=bool)
+    marked[chamber.source[on[is_wall[off // 3]] // 3]] = True
+    return marked
+
+
+def _sides_at_part(
+    one: np.ndarray, two: np.ndarray, on_part: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the sides off the part at which it meets something else, and the sides on it there.
+
+    Args:
+        one, two: sides at each edge of the cavity's surface, (e,).
+        on_part: marks its triangles on the part, (k,).
+    """
+    first, second = on_part[one // 3], on_part[two // 3]
+    return (
+        np.r_[one[~first & second], two[first & ~second]],
+        np.r_[two[~first & second], one[first & ~second]],
+    )
+
+
+def _on_fixtures(chamber: Chamber) -> np.ndarray:
+    """Mark the triangles of a chamber on its holder or its mask, (k,)."""
+    fixed = np.zeros(len(chamber.triangles), dtype=bool)
+    for name in chamber.fixtures:
+        fixed |= chamber.on_fixture(name)
+    return fixed
+
+
 def find_openings(chamber: Chamber) -> list[Opening]:
     """Return the openings of a chamber's walls through which the part goes out, the largest first.
 
@@ -55,11 +142,12 @@ def find_openings(chamber: Chamber) -> list[Opening]:
     """
     vertices, triangles = chamber.vertices, chamber.triangles
     names, on_part = surface_names(chamber), chamber.tags == TAG_PART
-    fixed = np.zeros(len(triangles), dtype=bool)
-    for name in chamber.fixtures:
-        fixed |= chamber.on_fixture(name)
+    fixed = _on_fixtures(chamber)
     edges, outward = edge_keys(triangles), unit_vectors(area_vectors(vertices, triangles))
-    meets = np.isin(edges, edges[np.repeat(on_part, 3)])
+    filled = on_part  # with the plugs of its holes, which go out through the wall with it
+    if (mask := chamber.fixtures.get("mask")) is not None and mask.kind == "plugs":
+        filled = on_part | chamber.on_fixture("mask")
+    meets = np.isin(edges, edges[np.repeat(filled, 3)])
     found: list[Opening] = []
     for wall in np.unique(names[~on_part & ~fixed & (chamber.source < 0)]):
         sides = np.flatnonzero(meets & np.repeat((names == wall) & ~on_part & ~fixed, 3))

@@ -403,7 +403,8 @@ def _proposed(
             as_good = (*faults(other), *its_floor.excess) <= (*faults(made), *floor.excess)
             if as_good and "holder" in other.tables:
                 made, floor = other, its_floor
-    made = padded(masked(made, floor, bores, wanted.shop), floor, target, wanted.shop)
+    holes = find_bores(mesh, target.triangles, for_arbor=False)
+    made = padded(masked(made, floor, holes, wanted.shop), floor, target, wanted.shop)
     made = only_touched(made, floor, wanted.shop)
     if wanted.ball_mm is not None and touched_share(made) < LEAST_TOUCHED:
         raise InputError(_too_large(made, shop.stock_mm(shot)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
@@ -230,17 +231,26 @@ def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> P
 def masked(bare: Proposal, floor: Floor, bores: Sequence[Bore], shop: Shop | None) -> Proposal:
     """Return a proposal with a mask on what must not be peened, where that does no harm.
 
-    Holes are plugged, also those that a wall cuts and through which balls would leave. What runs in
-    another part gets a sleeve that ends before the target. Where a mask would do harm, the surfaces
-    stay bare and are named.
+    Holes are plugged, also those that a wall crosses and through which balls would leave. What runs
+    in another part gets a sleeve that ends before the target. Where a mask would do harm, the
+    surfaces stay bare and are named.
+
+    Args:
+        bores: round holes of the part, also those that do not go through.
     """
     fits, runs = to_be_masked(bare.design, bare.chamber, bare.known)
     holes = to_be_plugged(bare.design, bare.chamber, bores, fits)
     if "mask" in bare.tables or bare.design.effects.part_turn is not None:
         return bare
     if holes and are_holes(bare.mesh, bare.known, fits, holes):
-        sizes = ", ".join(f"{2e3 * one.radius:.3g}" for one in holes)
-        text = f"plugs in holes of {sizes} mm, not to be peened, or open to the outside"
+        counts = Counter(f"{2e3 * one.radius:.3g}" for one in holes)
+        sizes = ", ".join(f"{k} x {size}" if k > 1 else size for size, k in counts.items())
+        named = "not to be peened, or " if fits else ""
+        what = "plugs in holes" if len(holes) > 1 else "a plug in the hole"
+        text = (
+            f"{what} of {sizes} mm, {named}which the wall crosses: from the rims up to the wall, "
+            "so that no ball leaves there"
+        )
         keys: dict[str, Any] = {"plugs": True, "at": {"faces": [one.wall for one in holes]}}
     elif runs:
         margin = 0.5 * math.ceil(2e3 * CLEAR * max(bare.design.shot.diameters))
@@ -341,8 +351,11 @@ def _harmless(
 
 def _build_at_extremes(made: Proposal) -> None:
     """Raise InputError if a chamber cannot be built somewhere in the ranges of the study."""
-    # Where the part no longer goes out, a study leaves a candidate out: no reason against a mask.
-    free = {"holder": None} if made.design.holder and made.design.holder.kind == "bore" else {}
+    # Where the part no longer goes out, or no plug is in the room, a study leaves a candidate out:
+    # no reason against a mask.
+    holder, mask = made.design.holder, made.design.mask
+    free: dict[str, None] = {"holder": None} if holder and holder.kind == "bore" else {}
+    free |= {"mask": None} if mask and mask.plugs else {}
     for extreme in _extremes(made.bounds):
         build_chamber(made.design.changed({**extreme, **free}))
 

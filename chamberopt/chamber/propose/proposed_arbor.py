@@ -55,7 +55,7 @@ RPM = 60.0
 
 
 class Bore(NamedTuple):
-    """A round hole that goes through a part, in the part file's frame."""
+    """A round hole of a part, in the part file's frame; what an arbor takes goes through."""
 
     triangles: np.ndarray  # marks those of its wall, (m,)
     at_mm: tuple[float, ...]  # a point on the wall, by which to choose it
@@ -69,11 +69,12 @@ class Bore(NamedTuple):
         return {"at_mm": list(self.at_mm), "crease_deg": CREASE_DEG}
 
 
-def find_bores(mesh: PartMesh, target: np.ndarray) -> list[Bore]:
+def find_bores(mesh: PartMesh, target: np.ndarray, for_arbor: bool = True) -> list[Bore]:
     """Return the bores of a part that are no part of its target, the widest first.
 
     Args:
         target: marks the triangles to be peened, (m,).
+        for_arbor: leaves out thin ones and those that end in the part or are narrowed by it.
     """
     faces = mesh.faces(CREASE_DEG)
     vectors = area_vectors(mesh.vertices, mesh.triangles)
@@ -85,14 +86,16 @@ def find_bores(mesh: PartMesh, target: np.ndarray) -> list[Bore]:
         along = np.abs(vectors[own] @ axes[:, 0]).sum() / faces.area[face]
         if along > 0.5 * ACROSS or spread[1] < 0.5 * spread[2]:
             continue
-        bore = _bore(mesh, own, axes[:, 0], faces.place_mm(face))
+        bore = _bore(mesh, own, axes[:, 0], faces.place_mm(face), for_arbor)
         if bore is not None:
             found.append(bore)
     return sorted(found, key=lambda one: -one.radius)
 
 
-def _bore(mesh: PartMesh, own: np.ndarray, axis: np.ndarray, at_mm: list[float]) -> Bore | None:
-    """Return the bore with these triangles as its wall; None if it is none, or not free."""
+def _bore(
+    mesh: PartMesh, own: np.ndarray, axis: np.ndarray, at_mm: list[float], for_arbor: bool
+) -> Bore | None:
+    """Return the bore with these triangles as its wall; None if it is none, or takes no arbor."""
     axis = np.round(axis * np.sign(axis[np.abs(axis).argmax()]), 6)
     frame = frame_along(axis / np.linalg.norm(axis))
     corners = (mesh.vertices @ frame.T)[mesh.triangles]
@@ -101,9 +104,12 @@ def _bore(mesh: PartMesh, own: np.ndarray, axis: np.ndarray, at_mm: list[float])
         return None
     middle = fitted_circle(hull)[0]
     inner, outer = radii(hull, middle)
-    away = distances_in_plan(corners[~own][..., :2], middle)
-    if inner < ROUND * outer or away.min(initial=math.inf) < FREE * inner or outer < THINNEST / 2:
+    if inner < ROUND * outer:
         return None
+    if for_arbor:
+        away = distances_in_plan(corners[~own][..., :2], middle)
+        if away.min(initial=math.inf) < FREE * inner or outer < THINNEST / 2:
+            return None
     height = float(corners[own][..., 2].mean())
     return Bore(own, tuple(at_mm), np.r_[middle, height] @ frame, frame[2], outer)
 

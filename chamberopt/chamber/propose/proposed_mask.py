@@ -15,11 +15,17 @@ import numpy as np
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import touched
-from chamberopt.chamber.checks.openings import Opening, find_openings
+from chamberopt.chamber.checks.openings import (
+    Opening,
+    find_openings,
+    find_walls_in_holes,
+    part_at_wall,
+)
+from chamberopt.chamber.checks.place_names import around
 from chamberopt.chamber.part import chosen_on_part, chosen_triangles
 from chamberopt.chamber.propose.pose import Turns
 from chamberopt.chamber.propose.proposal import Proposal, touched_share
-from chamberopt.chamber.propose.proposed_arbor import Bore
+from chamberopt.chamber.propose.proposed_arbor import Bore, find_bores
 from chamberopt.chamber.propose.proposed_end import Strips
 from chamberopt.chamber.propose.proposed_target import (
     RUNNING,
@@ -52,6 +58,7 @@ MET = 0.5  # share of a surface in the chamber from which on the shot meets it
 AWAY_DEG = 105.0  # angle to the way down from which on a face is turned away from the sonotrode
 LEAST = 0.02  # share of the target's area below which nothing is offered
 NEARLY_ALL, MOST_NAMED = 0.9, 3
+KINDS = ("surface", "faces")  # keys of a target that choose surfaces
 MOST_LOOKED_AT = 20  # surfaces, the largest
 # Share of the target's area from which on what is met of a surface is named, though most of it lies
 # outside of the chamber.
@@ -63,6 +70,9 @@ EDGES = (
     "peened, as dents roll a burr over them, or guard those that are thin (no source read)"
 )
 ONE_SIDED = 0.25  # share of the target over thin metal with a bare far side, which is told
+# Largest difference of a hole's sides over the longer one, with which it is called round.
+ROUND_HOLE = 0.05
+OTHER_HOLES = "the wall crosses other holes of the part, which need plugs"
 MOVED_MM = 0.3  # of an opening, which is milled round the part with less play
 # Names of what fits to other parts, whose size and finish shot would change.
 NEVER = re.compile(
@@ -103,18 +113,56 @@ def are_holes(
 def to_be_plugged(
     design: Design, chamber: Chamber, bores: Sequence[Bore], names: Sequence[str]
 ) -> list[Bore]:
-    """Return the bores that bear one of these names, or that the chamber's wall cuts."""
-    found, area = [], chamber.part.area
+    """Return the bores that bear one of these names, or that the chamber's wall crosses."""
+    found, area, at_wall = [], chamber.part.area, part_at_wall(chamber)
     named = np.zeros(len(area), dtype=bool)
     if names:
         named = rows_of(design, {"surface": list(names)})
     for bore in bores:
         rows = rows_of(design, {"faces": [bore.wall]})
-        whole, inside = area[rows].sum(), chamber.exposed_area[rows].sum()
-        is_named = area[rows & named].sum() > MOSTLY * whole
-        if is_named or (1.0 - MOSTLY) * whole < inside < MOSTLY * whole:
+        is_named = area[rows & named].sum() > MOSTLY * area[rows].sum()
+        if is_named or at_wall[rows].any():
             found.append(bore)
     return found
+
+
+def open_holes(proposal: Proposal) -> str:
+    """Return in words which holes of the part the wall crosses without a plug; "" if none."""
+    design, words, bores = proposal.design, [], None
+    for room in _rooms(proposal.chamber):
+        told = np.zeros(len(room.part.triangles), dtype=bool)
+        for hole in find_walls_in_holes(room):
+            told[hole.beside] = True
+            opening = hole.opening
+            wide, narrow = sorted((1e3 * one for one in opening.size), reverse=True)
+            size = f"{wide:.3g} mm"
+            if wide - narrow > ROUND_HOLE * wide:
+                size = f"{wide:.3g} x {narrow:.3g} mm"
+            words.append((size, opening.wall, around(np.array([opening.place]))))
+        at_wall = part_at_wall(room)
+        if not at_wall.any():
+            continue
+        if bores is None:
+            nothing = np.zeros(len(proposal.mesh.triangles), dtype=bool)
+            bores = find_bores(proposal.mesh, nothing, for_arbor=False)
+        for bore in bores:  # those beside whose mouth the wall goes on, so that none stands alone
+            rows = rows_of(design, {"faces": [bore.wall]})
+            if (rows & at_wall).any() and not (rows & told).any():
+                middles = room.part.vertices[room.part.triangles[rows & at_wall]].mean(axis=1)
+                words.append((f"{2e3 * bore.radius:.3g} mm", "the wall", around(middles)))
+    words = list(dict.fromkeys(words))
+    if not words:
+        return ""
+    listed = [f"{size} in {wall} at {place}" for size, wall, place in words[:MOST_NAMED]]
+    more = f" and {len(words) - MOST_NAMED} more" if len(words) > MOST_NAMED else ""
+    several = len(words) > 1
+    pin = "pins as wide in them" if several else f"a pin of {words[0][0]} in it"
+    wall = "the wall" if several else words[0][1]
+    return (
+        f"{'HOLES' if several else 'A HOLE'} THROUGH THE WALL, not plugged: the part's, of "
+        f"{', '.join(listed)}{more}: balls leave through {'them' if several else 'it'} unless "
+        f"{'each' if several else 'it'} is closed, as by {pin}, up to {wall}"
+    )
 
 
 def to_be_masked(
@@ -200,15 +248,13 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
                 "both, or agree on it",
             )
         )
+    if text := open_holes(proposal):
+        found.append(LeftOut({}, text))
     if text := moved_openings(proposal.chamber):
         found.append(LeftOut({}, text))
     if proposal.strips and (text := unlike_settings(proposal, proposal.strips)):
         found.append(LeftOut({}, text))
-    beside = [one for one in proposal.known if not np.any(one.triangles & target)]
-    names = {one.name for one in [*beside, *_bodies_of(proposal, target, beside)]}
-    others = [one for one in proposal.known if one.name in names]
-    found += _met_beside(proposal, others[:MOST_LOOKED_AT], float(area[target].sum()))
-    return found
+    return [*found, *met_beside(proposal, target)]
 
 
 def unlike_settings(proposal: Proposal, strips: Strips) -> str:
@@ -230,13 +276,16 @@ def unlike_settings(proposal: Proposal, strips: Strips) -> str:
         try:
             rooms = _rooms(build_chamber(design.changed(moved)))
         except InputError as error:
-            why[number + 1] = one_line(str(error)).partition(";")[0]
+            text = one_line(str(error)).partition(";")[0]
+            why[number + 1] = OTHER_HOLES if text.startswith("mask.") else text
             continue
         each = list(zip(rooms, proposed, strict=True))
         if any(abs(1e3 * (_lowest(one) - _lowest(like))) > MOVED_MM for one, like in each):
             why[number + 1] = "what of the part is within the walls hangs lower"
         elif any(_opens_elsewhere(one, like) for one, like in each):
             why[number + 1] = "the part goes out of a wall elsewhere"
+        elif any(len(find_walls_in_holes(a)) > len(find_walls_in_holes(b)) for a, b in each):
+            why[number + 1] = OTHER_HOLES
     if not why:
         return ""
     return (
@@ -316,7 +365,8 @@ def _bodies_of(
 ) -> Iterator[Surface]:
     """Yield the bodies of which a target is a face, such as a shaft of which a fillet is peened.
 
-    What the file names beside the target stands for a body that is mostly made of it.
+    A face that goes on smoothly beside the target is one too. What the file names beside the target
+    stands for a body that is mostly made of it.
 
     Args:
         target: marks the triangles of the target in the part's file, (m,).
@@ -329,40 +379,51 @@ def _bodies_of(
     for one in proposal.known:
         names, rest = {*one.keys.get("surface", ())}, one.triangles & ~target
         is_body = bool(names) and not names & {*chosen, "all"} and np.any(one.triangles & target)
-        if is_body and area[rest & ~told].sum() > 0.5 * area[rest].sum() > 0.0:
+        goes_on = "faces" in one.keys and bool(np.any(one.triangles & target) and rest.any())
+        if goes_on or (is_body and area[rest & ~told].sum() > 0.5 * area[rest].sum() > 0.0):
             yield one
 
 
-def _met_beside(
-    proposal: Proposal, others: Sequence[Surface], target_area: float
-) -> Iterator[LeftOut]:
+def met_beside(proposal: Proposal, target: np.ndarray) -> Iterator[LeftOut]:
     """Yield what the shot meets of the part beside its target, the largest surfaces by name.
 
+    The area of what is not named is told too.
+
     Args:
-        target_area: area of the target [m²].
+        target: marks the triangles of the target in the part's file, (m,).
     """
     design, chamber = proposal.design, proposal.chamber
-    found, wholes, words = [], {}, {}
+    beside = [one for one in proposal.known if not np.any(one.triangles & target)]
+    choices = {one.name for one in [*beside, *_bodies_of(proposal, target, beside)]}
+    others = [one for one in proposal.known if one.name in choices][:MOST_LOOKED_AT]
+    target_area = float(areas(proposal.mesh.vertices, proposal.mesh.triangles)[target].sum())
+    keys = {key: one for key, one in proposal.tables["part.target"].items() if key in KINDS}
+    aimed = chamber.part.target | rows_of(design, keys)  # with what was left out of it
+    bare = np.where(aimed, 0.0, chamber.exposed_area)
+    found, wholes, rows = [], {}, {}
     for one in named_or_all(others):
-        inside, wholes[one.name] = met_area(design, chamber, one)
+        own = rows[one.name] = rows_of(design, one.keys)
+        wholes[one.name] = float(chamber.part.area[own & ~aimed].sum())
+        inside = float(bare[own].sum())
         if inside > min(MET * wholes[one.name], PARTLY_MET * target_area):
-            rows, target = rows_of(design, one.keys), chamber.part.target
-            found.append((one, inside, np.where(rows & ~target, chamber.exposed_area, 0.0)))
-            words[one.name] = f"the rest of {one.name}" if np.any(rows & target) else one.name
-    if not found:
-        return
+            found.append((one, inside, np.where(own, bare, 0.0)))
     met = [(one, inside, wholes[one.name]) for one, inside in apart(found)]
-    met.sort(key=lambda one: (not RUNNING.search(one[0].name), one[1] <= MET * one[2]))
-    names = [
-        f"{words[one.name]} ({area_in_mm2(inside)}"
-        f"{'' if inside > NEARLY_ALL * whole else ' of it'})"
-        for one, inside, whole in met[:MOST_NAMED]
-    ]
-    more = f" and {len(met) - MOST_NAMED} more" if len(met) > MOST_NAMED else ""
+    met.sort(key=lambda one: not RUNNING.search(one[0].name))
+    named, names = np.zeros_like(aimed), []
+    for one, inside, whole in met[:MOST_NAMED]:
+        named |= rows[one.name]
+        rest_of = "the rest of " if np.any(rows[one.name] & aimed) else ""
+        of_it = "" if inside > NEARLY_ALL * whole else " of it"
+        names.append(f"{rest_of}{one.name} ({area_in_mm2(inside)}{of_it})")
+    text = ", ".join(names)
+    if (rest := float(bare[~named].sum())) > LEAST * target_area:
+        text += f"{' and ' if text else ''}{area_in_mm2(rest)} {'more' if text else 'beside it'}"
+    if not text:
+        return
     still = "STILL " if proposal.design.mask is not None else ""
-    runs = "runs or fits by its name, and " if RUNNING.search(met[0][0].name) else ""
+    runs = "runs or fits by its name, and " if met and RUNNING.search(met[0][0].name) else ""
     yield LeftOut(
         {},
-        f"{still}NOT MASKED: the shot also meets {', '.join(names)}{more}; {runs}what has to keep "
+        f"{still}NOT MASKED: the shot also meets {text}; {runs}what has to keep "
         "its size and finish takes a mask",
     )

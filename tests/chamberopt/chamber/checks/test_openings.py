@@ -8,22 +8,30 @@ import trimesh
 from shapely import Polygon
 
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.openings import find_openings
+from chamberopt.chamber.checks.openings import find_openings, find_walls_in_holes, part_at_wall
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
 
 DESIGNS = Path(__file__).resolve().parents[4] / "designs"
 
 
-def chamber_of(folder: Path, body: trimesh.Trimesh, **part: object) -> Chamber:
-    """A body in mm, 15 mm over the floor of a box of 60 x 50 x 40 mm; its underside is peened."""
+def chamber_of(
+    folder: Path, body: trimesh.Trimesh, plugs: dict[str, object] | None = None, **part: object
+) -> Chamber:
+    """A body in mm, 15 mm over the floor of a box of 60 x 50 x 40 mm; its underside is peened.
+
+    Args:
+        plugs: keys that choose the walls of holes that are plugged.
+    """
     body.export(folder / "body.stl")
     data = load_design(DESIGNS / "gear.toml").model_dump()
     down = {"direction": (0, 0, -1), "angle_deg": (0, 30)}
     given = {"mesh": str(folder / "body.stl"), "unit": "mm", "target": down, "smoothing": "off"}
     sizes = {"length_mm": 60.0, "width_mm": 50.0, "height_mm": 40.0, "sonotrode_distance_mm": 15.0}
     chamber = {"shape": "box", **sizes}
-    return build_chamber(validate(Design, {**data, "part": {**given, **part}, "chamber": chamber}))
+    mask = None if plugs is None else {"plugs": True, "at": plugs}
+    own = {"part": {**given, **part}, "chamber": chamber, "mask": mask}
+    return build_chamber(validate(Design, {**data, **own}))
 
 
 def test_a_bar_through_both_side_walls_and_a_post_through_the_ceiling(tmp_path: Path) -> None:
@@ -102,3 +110,73 @@ def test_a_lid_wider_than_its_chamber_ends_all_walls(tmp_path: Path) -> None:
     lines = find_openings(chamber_of(tmp_path, trimesh.creation.box((80, 70, 40))))
     assert sorted(1e3 * max(one.size) for one in lines) == pytest.approx([50, 50, 60, 60])
     assert all(min(one.size) < 1e-9 for one in lines)
+
+
+def drilled(
+    body: trimesh.Trimesh, radius: float, middle: tuple[float, ...], axis: int
+) -> trimesh.Trimesh:
+    """A body with a hole through it along an axis, 0 to 2."""
+    drill = trimesh.creation.cylinder(radius, 200.0, sections=64)
+    ends = np.zeros((4, 4))
+    ends[[0, 1, 2, 3], [(axis + 1) % 3, (axis + 2) % 3, axis, 3]] = 1.0
+    drill.apply_transform(ends.T)
+    drill.apply_translation(middle)
+    left: trimesh.Trimesh = trimesh.boolean.difference([body, drill], engine="manifold")
+    return left
+
+
+def test_the_ceiling_stands_in_the_bore_of_a_tube(tmp_path: Path) -> None:
+    """Open at the sonotrode, the wall stands in it; closed there, no ball gets into it."""
+    tube = trimesh.creation.annulus(6.0, 8.0, 60.0, sections=64)
+    chamber = chamber_of(tmp_path, tube)
+    (hole,) = find_walls_in_holes(chamber)
+    assert hole.opening.wall == "the ceiling"
+    place = [*hole.opening.size, *hole.opening.place]
+    assert 1e3 * np.array(place) == pytest.approx([12, 12, 0, 0, 40], abs=0.05)
+    middles = 1e3 * chamber.part.vertices[chamber.part.triangles].mean(axis=1)
+    inner = np.hypot(*middles.T[:2]) < 6.5
+    assert inner[hole.beside].all()
+    assert {*hole.beside} < {*np.flatnonzero(part_at_wall(chamber))}  # the outside meets it too
+
+    plate = trimesh.creation.cylinder(8.0, 2.0, sections=64)
+    plate.apply_translation((0, 0, -29))
+    closed = trimesh.boolean.union([tube, plate], engine="manifold")
+    assert find_walls_in_holes(chamber_of(tmp_path, closed)) == []
+
+
+def test_the_wall_stands_in_the_holes_of_a_plate_that_it_crosses(tmp_path: Path) -> None:
+    """The wall, at y = 25 mm, is 0.2 mm deep in a plate with two holes; a third one is beside."""
+    plate = trimesh.creation.box(bounds=((-29, 24.8, -10), (29, 34.8, 10)))
+    foot = trimesh.creation.box(bounds=((-3, 0, -10), (3, 30, -8)))
+    body = trimesh.boolean.union([plate, foot], engine="manifold")
+    for x, radius in ((-15, 4.0), (15, 2.5)):
+        body = drilled(body, radius, (x, 0, 0), 1)
+    body = drilled(body, 1.0, (0, 5, 0), 2)
+    large, small = find_walls_in_holes(chamber_of(tmp_path, body, offset_mm=(0, 17.4)))
+    for hole, wide in ((large, 8.0), (small, 5.0)):
+        assert hole.opening.wall == "the wall"
+        assert 1e3 * np.array(hole.opening.size) == pytest.approx([wide, wide], rel=5e-3)
+        assert 1e3 * hole.opening.place[1] == pytest.approx(25.0, abs=1e-6)
+
+
+def test_the_wall_above_a_plate_that_divides_the_room_is_in_no_hole(tmp_path: Path) -> None:
+    """Balls get through its hole to the walls above it, which are not in the hole."""
+    plate = drilled(trimesh.creation.box((70, 60, 4)), 3.0, (0, 0, 0), 2)
+    assert find_walls_in_holes(chamber_of(tmp_path, plate)) == []
+
+
+def test_a_hole_along_the_wall_meets_it_beside_its_mouths(tmp_path: Path) -> None:
+    bar = drilled(trimesh.creation.box((100, 12, 8)), 2.5, (30, 0, 0), 2)
+    chamber = chamber_of(tmp_path, bar)
+    assert find_walls_in_holes(chamber) == []
+    part = chamber.part
+    in_hole = np.hypot(*(1e3 * part.vertices - [30, 0, 0])[:, :2].T) < 2.6
+    rows = in_hole[part.triangles].all(axis=1) & (np.abs(part.corner_normals[:, 0, 2]) < 0.1)
+    assert part_at_wall(chamber)[rows].any()
+
+    assert len([one for one in find_openings(chamber) if one.place[0] > 0.0]) == 2  # beside it
+    wall: dict[str, object] = {"faces": [{"at_mm": (27.5, 0.0, 0.0), "crease_deg": 30.0}]}
+    plugged = chamber_of(tmp_path, bar, wall)
+    assert not part_at_wall(plugged)[rows].any()
+    (whole,) = (one for one in find_openings(plugged) if one.place[0] > 0.0)
+    assert 1e3 * np.array(whole.size) == pytest.approx([12, 8], abs=1e-6)

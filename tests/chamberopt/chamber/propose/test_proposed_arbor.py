@@ -86,6 +86,8 @@ def test_bores_are_round_free_and_go_through() -> None:
     assert 1e3 * bore.point == pytest.approx([20, 20, 5], abs=1e-3)
     assert np.abs(bore.axis) == pytest.approx([0, 0, 1])
     assert find_bores(mesh, bore.triangles) == []  # it is to be peened
+    every = find_bores(mesh, nothing, for_arbor=False)  # a plug fills any but the square one
+    assert [round(1e3 * one.radius, 2) for one in every] == [5.0, 4.0, 4.0, 1.0]
 
 
 @pytest.mark.parametrize(

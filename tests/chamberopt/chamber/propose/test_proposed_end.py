@@ -10,6 +10,7 @@ import pytest
 import trimesh
 from manifold3d import Manifold, Mesh
 
+from chamberopt.chamber.propose import proposed_mask
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.held_proposal import rests
 from chamberopt.chamber.propose.proposal import Wanted
@@ -25,6 +26,7 @@ from chamberopt.chamber.propose.proposed_end import (
 )
 from chamberopt.chamber.propose.proposed_mask import rows_of, unlike_settings
 from chamberopt.chamber.propose.proposed_target import Surface, Target, propose_sizes
+from chamberopt.common.errors import InputError
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.triangles import areas
 from tests.chamberopt.chamber.propose.test_proposed_arbor import drum, part_of
@@ -236,7 +238,9 @@ def test_a_target_without_a_level_long_axis_or_that_fits_has_no_strip() -> None:
     assert strip(mesh, target, (0.0, 90.0, 0.0), 399e-3) is not None
 
 
-def test_what_no_sonotrode_carries_is_peened_a_strip_at_a_time(tmp_path: Path) -> None:
+def test_what_no_sonotrode_carries_is_peened_a_strip_at_a_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The edges of a plate of 600 mm: it goes out of a chamber on one sonotrode at both ends."""
     part = tmp_path / "plate.stl"
     trimesh.creation.box((600.0, 110.0, 50.0)).export(part)
@@ -254,6 +258,15 @@ def test_what_no_sonotrode_carries_is_peened_a_strip_at_a_time(tmp_path: Path) -
     # A plate is alike in all settings; of its ends it goes out of no wall that is closed.
     assert made.strips is not None
     assert unlike_settings(made, made.strips) == ""
+
+    def no_plug(_: object) -> None:
+        raise InputError("mask.at: it touches none of these faces inside the room; give others")
+
+    monkeypatch.setattr(proposed_mask, "build_chamber", no_plug)
+    said = unlike_settings(made, made.strips)
+    assert said.endswith(
+        "a chamber of their own: the wall crosses other holes of the part, which need plugs"
+    )
 
 
 def test_a_setting_whose_strip_hangs_otherwise_is_named(tmp_path: Path) -> None:

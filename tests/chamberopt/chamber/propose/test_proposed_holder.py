@@ -286,7 +286,9 @@ def test_what_is_seldom_peened_is_named_or_masked(tmp_path: Path, side: str) -> 
     sharp, said = left_out
     assert sharp.text.startswith("SHARP EDGES, 80 mm of the target's outer edges")
     assert made.design.mask is None
-    assert said.text.startswith("NOT MASKED: the shot also meets FLANGE")
+    assert said.text.startswith(
+        "NOT MASKED: the shot also meets SIDES (1080 mm² of it), FLANGE (360 mm² of it);"
+    )
     assert said.text in tomllib.loads(text)["to_settle"]
 
 
@@ -301,7 +303,7 @@ def test_the_rest_of_a_body_is_met_beside_a_target_that_is_a_face_of_it(tmp_path
     made = propose(part, Wanted("mm"), lambda _: ["face 2.1"])
     _, said = (one.text for one in find_left_out(made) if not one.keys)
     assert said.startswith(
-        "NOT MASKED: the shot also meets KEY (360 mm² of it), the rest of SHAFT (1080 mm²"
+        "NOT MASKED: the shot also meets the rest of SHAFT (1080 mm² of it), KEY (360 mm² of it);"
     )
     named = propose(part, Wanted("mm"), lambda _: ["SHAFT"])
     assert not any("SHAFT" in one.text for one in find_left_out(named) if not one.keys)

@@ -1,14 +1,29 @@
-"""Surfaces that must not be peened, by their names."""
+"""Surfaces that must not be peened, by their names, and holes that the wall crosses."""
 
+import re
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.checks.openings import Opening
+from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.checks.openings import Opening, find_walls_in_holes
 from chamberopt.chamber.propose import proposed_mask
-from chamberopt.chamber.propose.proposed_mask import NEVER, moved_openings, pads, sharp_edges
+from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.proposal import Wanted
+from chamberopt.chamber.propose.proposed_mask import (
+    NEVER,
+    find_left_out,
+    met_beside,
+    moved_openings,
+    open_holes,
+    pads,
+    sharp_edges,
+)
+from chamberopt.chamber.propose.proposed_target import Surface, surfaces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
 
@@ -79,3 +94,66 @@ def test_openings_that_move_in_a_second_pose_are_told(monkeypatch: pytest.Monkey
     assert " to none: " in told([here], [top])
     wider = here._replace(size=(0.02, 0.012))
     assert "OPENINGS MOVE" in told([here], [wider])
+
+
+def test_a_bore_out_through_the_ceiling_is_plugged(tmp_path: Path) -> None:
+    """A flange on a tube of 90 mm, open at the sonotrode and closed at its upper end."""
+    flange = trimesh.creation.cylinder(18.0, 6.0, sections=48)
+    tube = trimesh.creation.cylinder(10.0, 90.0, sections=48)
+    tube.apply_translation((0, 0, 42.0))
+    bore = trimesh.creation.cylinder(6.0, 80.0, sections=48)
+    bore.apply_translation((0, 0, 30.0))
+    body = trimesh.boolean.difference(
+        [trimesh.boolean.union([flange, tube], engine="manifold"), bore], engine="manifold"
+    )
+    body.export(tmp_path / "tube.stl")
+    wanted = Wanted("mm", pose="standing", ball_mm=2.0)
+    made = propose(tmp_path / "tube.stl", wanted, lambda _: ["face 3"])  # the flange's underside
+    assert made.design.mask is not None
+    assert made.design.mask.plugs
+    assert made.reasons["mask.plugs"].startswith("a plug in the hole of 12 mm, which the wall")
+    assert find_walls_in_holes(made.chamber) == []
+    assert open_holes(made) == ""
+
+    bare = made.design.changed({"mask": None})
+    without = replace(made, design=bare, chamber=build_chamber(bare))
+    texts = [one.text for one in find_left_out(without)]
+    (told,) = (one for one in texts if "THROUGH THE WALL" in one)
+    assert told.startswith(
+        "A HOLE THROUGH THE WALL, not plugged: the part's, of 12 mm in the ceiling at (0.0, 0.0, "
+    )
+    assert told.endswith("as by a pin of 12 mm in it, up to the ceiling")
+
+
+def test_the_face_that_goes_on_beside_a_fillet_is_met(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stud, of whose smooth side the fillet is a face of the CAD file, in a room round it."""
+    angle = np.radians(np.arange(0.0, 91.0, 10.0))
+    fillet = np.c_[10.0 - 4.0 * np.cos(angle), 56.0 + 4.0 * np.sin(angle)]
+    profile = np.r_[[[0.0, 0.0], [6.0, 0.0]], fillet, [[16.0, 60.0], [16.0, 68.0], [0.0, 68.0]]]
+    stud = trimesh.creation.revolve(profile, sections=32)
+    triangles = stud.faces.astype(np.int32)
+    mesh = PartMesh(1e-3 * stud.vertices, triangles, number_by_position(len(triangles)), (), "", {})
+    height = stud.triangles_center[:, 2]
+    radius = np.hypot(*stud.triangles_center.T[:2])
+    bent = (height > 56.0) & (height < 60.0) & (radius < 10.0)
+    keys = {"faces": [{"at_mm": [0.0, 0.0, 0.0], "cad_face": True}]}
+    known = [Surface("fillets of 4 mm", keys, bent, ""), *surfaces(mesh)]
+    monkeypatch.setattr(
+        proposed_mask,
+        "rows_of",
+        lambda _, own: next(one.triangles for one in known if one.keys == own),
+    )
+    area = 1e-6 * stud.area_faces
+    part = SimpleNamespace(target=bent, area=area)
+    made = SimpleNamespace(
+        mesh=mesh,
+        design=SimpleNamespace(mask=None),
+        chamber=SimpleNamespace(part=part, exposed_area=area),
+        known=known,
+        tables={"part.target": keys},
+    )
+    (met,) = met_beside(made, bent)  # type: ignore[arg-type]
+    assert met.text.startswith("NOT MASKED: the shot also meets the rest of face 1 (")
+    told = sum(float(one) for one in re.findall(r"([0-9]+) mm²", met.text))
+    assert told == pytest.approx(1e6 * area[~bent].sum(), abs=2.0)
+    assert " mm² more; what has to keep" in met.text  # one of four faces is not named
