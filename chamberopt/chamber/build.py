@@ -483,12 +483,12 @@ def _room_over_sonotrode(
     low, high = 1e3 * largest.vertices[:, 2].min(), 1e3 * largest.vertices[:, 2].max()
     number, marked = len(rest), np.any(left_out, axis=0)
     size = f"{1e6 * max(volumes):.3g} cm³ between z = {low:.4g} and {high:.4g} mm"
-    covers = np.any([*closing.values(), tags < 0], axis=0)
+    covers = np.any([*closing.values(), np.zeros(len(tags), dtype=bool)], axis=0)
     if (marked & covers).any() and not (marked & ~covers & (tags != TAG_PART)).any():
         by = " and ".join(name for name, rows in closing.items() if (rows & marked).any())
         hollows = "a hollow" if number == 1 else f"{number} hollows"
-        largest = "" if number == 1 else ", the largest"
-        note = f"closed by {by}: {hollows} of the part{largest} of {size}"
+        which = "" if number == 1 else ", the largest"
+        note = f"closed by {by}: {hollows} of the part{which} of {size}"
     else:
         closed = "a closed room" if number == 1 else f"{number} closed rooms, the largest"
         note = f"{bodies} cuts off {closed} of {size}"
