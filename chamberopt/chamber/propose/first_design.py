@@ -18,6 +18,7 @@ from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.propose.held_proposal import (
     clamped_outside,
+    grips_poorly,
     hangs_by_a_face,
     held,
     is_firm,
@@ -90,7 +91,7 @@ from chamberopt.common.progress import step
 from chamberopt.common.toml_fields import MAX_COORDINATE_MM
 from chamberopt.design.design import Design, validate
 from chamberopt.design.materials import CATALOGUE, USUAL, alloy, ball, balls
-from chamberopt.geometry.heights import lowest_over
+from chamberopt.geometry.heights import lowest_over, points_up_to
 from chamberopt.geometry.meshes.part_mesh import PartMesh, keep_part, read_part_cached
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import BY_SIZE, METRES_PER
@@ -100,6 +101,7 @@ LEAST_TOUCHED = 0.02  # share of the target that balls which are wished for have
 REACHES = 0.95  # of a part's length, from which on a target reaches both of its ends
 AT_WALL = 2.0  # ball diameters from the target to the wall through which its end goes out
 ROUNDED = 0.5e-3  # m by which sizes are rounded up
+FEW = 2  # sonotrodes side by side that are better than a room of which the part is held badly
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
@@ -379,6 +381,7 @@ def _proposed(
             raise refused
         return best
 
+    spare: tuple[Proposal, Floor] | None = None  # a room of which the part is held badly
     with step("building and checking the chamber") as progress:
         made, floor = built(is_local=goes_out)
         if not goes_out and (not floor.is_one_sonotrode or is_capped(made)):
@@ -388,7 +391,9 @@ def _proposed(
                     if not local.chamber.pieces_in_air:
                         local = clamped_outside(local, its_floor, wanted.shop)
                         local = padded(local, its_floor, target, wanted.shop)
-                    if faults(local) <= faults(made):
+                    if grips_poorly(local, its_floor):
+                        spare = local, its_floor
+                    elif faults(local) <= faults(made):
                         made, floor = local, its_floor
     if made.chamber.pieces_in_air:
         with step("choosing what holds the part") as progress:
@@ -396,6 +401,17 @@ def _proposed(
             made = held(made, floor, target, above, bores, wanted.shop, progress)
     elif "holder" not in made.tables:
         made = clamped_outside(made, floor, wanted.shop)
+    is_small = floor.face is not None and made.sonotrode_count <= FEW
+    is_good = is_small and "holder" in made.tables
+    if spare is not None and not is_good and faults(spare[0]) <= faults(made):
+        made, floor = spare
+    upright = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, "standing")
+    is_free = end is None and wanted.pose is None and turns != upright
+    if spare is not None and is_free and made.sonotrode_count > 1:
+        with suppress(InputError):
+            other = _proposed(path, wanted, mesh, known, target, upright, ON_END, None)
+            if is_firm(other) and other.sonotrode_count == 1 and faults(other) <= faults(made):
+                return other
     if turning is not None:
         with step("trying it on its axis, turning") as progress, suppress(InputError):
             other, its_floor = built(is_local=False, turning=turning)
@@ -568,7 +584,8 @@ def _place(
         posed[:, 2] -= posed[:, 2].min()
         on_target = posed[np.unique(part.triangles[part.target])]
         top, around = float(on_target[:, 2].max()), on_target if is_local else None
-        sizes, shop = propose_sizes(posed, top, ball, shape, wider, around), wanted.shop
+        sizes = propose_sizes(posed, top, ball, shape, wider, around, part.triangles)
+        shop = wanted.shop
         out_at = sizes.height - sizes.distance
         if (
             sizes.through_ceiling
@@ -712,15 +729,19 @@ def _room_reason(made: Proposal, floor: Floor) -> dict[str, str]:
 
 
 def _room_in_box(made: Proposal) -> str:
-    """Return in words how far each wall of an upright box is from the part, or from the target."""
+    """Return in words how far each wall of an upright box is from the part, or from the target.
+
+    What of the part is above the ceiling does not count.
+    """
     part, chamber = made.chamber.part, made.tables["chamber"]
+    below = points_up_to(part.vertices, part.triangles, 1e-3 * chamber["height_mm"])
     on_target = part.vertices[part.triangles[part.target]].reshape(-1, 3)
     beside, before = [], []
     for k, (name, key) in enumerate((("x", "length_mm"), ("y", "width_mm"))):
         for side, sign in (("-", -1.0), ("+", 1.0)):
             whole, target = (
                 0.5 * float(chamber[key]) - 1e3 * float((sign * one[:, k]).max())
-                for one in (part.vertices, on_target)
+                for one in (below, on_target)
             )
             if whole > 0.0:
                 beside.append(f"{whole:.3g} mm at {side}{name}")
