@@ -53,9 +53,9 @@ def lowest_over(vertices: np.ndarray, triangles: np.ndarray, outline: np.ndarray
 
 
 def points_up_to(vertices: np.ndarray, triangles: np.ndarray, level: float) -> np.ndarray:
-    """Return points (k, 3) [m] whose hull is that of what of a surface is not above a level.
+    """Return points (k, 3) [m] whose hull is that of what of a closed surface is below a level.
 
-    They are its vertices, and the places where its edges cross the level.
+    They are its vertices up to the level, and the places where its edges cross it.
 
     Args:
         vertices, triangles: as of lowest_over.
@@ -65,6 +65,5 @@ def points_up_to(vertices: np.ndarray, triangles: np.ndarray, level: float) -> n
     below, above = start[:, 2] - level, end[:, 2] - level
     cut = (below < 0.0) & (above > 0.0)  # an edge is a side of two triangles, one either way
     share = (below[cut] / (below[cut] - above[cut]))[:, None]
-    return np.concatenate(
-        [vertices[vertices[:, 2] <= level], start[cut] + share * (end[cut] - start[cut])]
-    )
+    crossings = start[cut] + share * (end[cut] - start[cut])
+    return np.concatenate([vertices[vertices[:, 2] <= level], crossings])

@@ -100,6 +100,7 @@ from chamberopt.geometry.triangles import rotation_matrix
 LEAST_TOUCHED = 0.02  # share of the target that balls which are wished for have to touch
 REACHES = 0.95  # of a part's length, from which on a target reaches both of its ends
 AT_WALL = 2.0  # ball diameters from the target to the wall through which its end goes out
+OVER_RIM = (0.0, 2.5e-3, 5e-3)  # m over the ceiling at which a clamp may begin, as over a flange
 ROUNDED = 0.5e-3  # m by which sizes are rounded up
 FEW = 2  # sonotrodes side by side that are better than a room of which the part is held badly
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
@@ -590,7 +591,7 @@ def _place(
         if (
             sizes.through_ceiling
             and not is_local
-            and not can_be_clamped(posed, part.triangles, 2, out_at)
+            and not any(can_be_clamped(posed, part.triangles, 2, out_at + one) for one in OVER_RIM)
         ):  # a higher ceiling takes in the whole part
             sizes = propose_sizes(posed, float(posed[:, 2].max()), ball, shape, wider)
         local = None

@@ -40,6 +40,7 @@ ROUNDS = 3  # in which what is below the ceiling and the sonotrode's distance fo
 # Edges of a part that turn by more are at one level if they lie within ONE_LEVEL [m]; they count if
 # together they are longer than this share of the rectangle round the part.
 LEVEL_EDGE_DEG, ONE_LEVEL, MUCH = 20.0, 1e-5, 0.05
+SEEN = 1e-3  # m of a part that stand out above a ceiling at least
 OVER_LEDGE = 2.0  # ball diameters between a face that looks up and a ceiling over it
 SHAPES = ("cylinder", "box", "prism", "conformal")
 TOLD = 0.5  # share of a surface that others named tell of, from which on it is not named
@@ -115,9 +116,8 @@ def propose_sizes(
         distance = 1e-3 * _up_mm(least * wider)
         height = 1e-3 * _up_mm(distance + below + above)
         if through and triangles is not None:
-            levels, up = _ledges(vertices, triangles)
-            ends = distance + below + CLOSEST * above, min(height + above, distance + top)
-            height = _off_ledges(height, ends, distance + levels, up, ball)
+            ends = distance + below + CLOSEST * above, min(height + above, distance + top - SEEN)
+            height = _off_ledges(vertices, triangles, distance, height, ends, ball)
         return distance, height
 
     distance, height = room_below(vertices)
@@ -173,27 +173,37 @@ def _ledges(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _off_ledges(
-    height: float, ends: tuple[float, float], levels: np.ndarray, up: np.ndarray, ball: float
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    distance: float,
+    height: float,
+    ends: tuple[float, float],
+    ball: float,
 ) -> float:
     """Return the height [m] of a ceiling between two ends that is off all ledges of a part.
 
     It keeps twice its tolerance off them, so that the ceiling meets one section of the part, and
-    over those that look up two balls. It is the nearest one, or stays where there is none.
+    over those that look up two balls. It is lowered, so that the face goes out and no ball lies on
+    it, or else raised. It stays where there is no such height.
 
     Args:
-        height, ends: over the sonotrode [m].
-        levels, up: heights of the ledges over it [m], and which look up, (k,).
-        ball: diameter of a ball [m].
+        vertices, triangles, ball: as of propose_sizes.
+        distance, height, ends: over the sonotrode [m]: the part's lowest point, and the ceiling.
     """
+    levels, up = _ledges(vertices, triangles)
     off = 2e-3 * iso_2768_m(1e3 * height)
     over = np.where(up, max(OVER_LEDGE * ball, off), off)
+
+    def is_free(one: float) -> bool:
+        above = one - distance - levels
+        return not ((above > 1e-9 - off) & (above < over - 1e-9)).any()
+
+    if is_free(height):
+        return height
     most = math.ceil(1e3 * (ends[1] - ends[0]))
-    tried = np.array(sorted(range(-most, most + 1), key=lambda one: (abs(one), one)))
-    for one in height + 1e-3 * tried:  # of two that are as near, the part below the lower is less
-        is_near = (one > levels - off + 1e-9) & (one < levels + over - 1e-9)
-        if not is_near.any() and ends[0] - 1e-9 <= one <= ends[1] + 1e-9:
-            return float(one)
-    return height
+    tried = (height + way * k for way in (-1e-3, 1e-3) for k in range(1, most + 1))
+    inside = (one for one in tried if ends[0] - 1e-9 <= one <= ends[1] + 1e-9)
+    return next(filter(is_free, inside), height)
 
 
 def middle_in_plan(points: np.ndarray) -> np.ndarray:
