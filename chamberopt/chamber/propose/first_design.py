@@ -65,6 +65,7 @@ from chamberopt.chamber.propose.proposed_end import (
     cut_shape,
     held_end,
     local_room,
+    root_out,
     strip,
 )
 from chamberopt.chamber.propose.proposed_floor import (
@@ -297,6 +298,8 @@ def _proposed(
     if not (end or wanted.pose) and (hanging := _hanging(mesh, target, turns, diameter, wanted)):
         turns, pose_reason = hanging, ON_END
     shape = cut_shape(mesh, target.triangles, target.keys.get("box_mm"))
+    if end is not None and end.room_mm is not None:  # the room is round all of that
+        shape = cut_shape(mesh, np.ones(len(mesh.triangles), dtype=bool), end.room_mm)
     # Balls would lie on what holds an end at the side: it goes out through the wall instead.
     out = end.axis if end is not None and end.goes_out else None
     bores = find_bores(mesh, target.triangles)
@@ -392,7 +395,7 @@ def _proposed(
                     if not local.chamber.pieces_in_air:
                         local = clamped_outside(local, its_floor, wanted.shop)
                         local = padded(local, its_floor, target, wanted.shop)
-                    if grips_poorly(local, its_floor):
+                    if grips_poorly(local):
                         spare = local, its_floor
                     elif faults(local) <= faults(made):
                         made, floor = local, its_floor
@@ -406,13 +409,6 @@ def _proposed(
     is_good = is_small and "holder" in made.tables
     if spare is not None and not is_good and faults(spare[0]) <= faults(made):
         made, floor = spare
-    upright = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, "standing")
-    is_free = end is None and wanted.pose is None and turns != upright
-    if spare is not None and is_free and made.sonotrode_count > 1:
-        with suppress(InputError):
-            other = _proposed(path, wanted, mesh, known, target, upright, ON_END, None)
-            if is_firm(other) and other.sonotrode_count == 1 and faults(other) <= faults(made):
-                return other
     if turning is not None:
         with step("trying it on its axis, turning") as progress, suppress(InputError):
             other, its_floor = built(is_local=False, turning=turning)
@@ -424,7 +420,19 @@ def _proposed(
     made = only_touched(made, floor, wanted.shop)
     if wanted.ball_mm is not None and touched_share(made) < LEAST_TOUCHED:
         raise InputError(_too_large(made, shop.stock_mm(shot)))
-    return replace(made, reasons={**made.reasons, **_room_reason(made, floor)})
+    made = replace(made, reasons={**made.reasons, **_room_reason(made, floor)})
+    if spare is None or end is not None or wanted.pose is not None or not grips_poorly(made):
+        return made
+    upright = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, "standing")
+    by_root = root_out(mesh, target, turns, AT_WALL * diameter)
+    for pose, why, root in ((turns, pose_reason, by_root), (upright, ON_END, None)):
+        if root is not None or pose != turns:
+            with suppress(InputError):
+                other = _proposed(path, wanted, mesh, known, target, pose, why, root)
+                is_better = is_firm(other) and not grips_poorly(other) and not rests(other)
+                if is_better and other.sonotrode_count <= made.sonotrode_count:
+                    return other
+    return made
 
 
 def _takes_room(warning: DesignWarning) -> bool:

@@ -23,7 +23,7 @@ from chamberopt.chamber.propose.proposal import (
     touched_share,
 )
 from chamberopt.chamber.propose.proposed_arbor import Bore
-from chamberopt.chamber.propose.proposed_end import HeldEnd
+from chamberopt.chamber.propose.proposed_end import DEEP, HeldEnd
 from chamberopt.chamber.propose.proposed_floor import Floor
 from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices
 from chamberopt.chamber.propose.proposed_mask import (
@@ -47,7 +47,8 @@ from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import Progress
 from chamberopt.design.fixture import USUAL_SHELL_MM, WIDEST_GAP
 from chamberopt.geometry.faces import Faces
-from chamberopt.geometry.outline import convex_hull, frame_along, narrowest_rectangle
+from chamberopt.geometry.outline import convex_hull, fitted_circle, frame_along, narrowest_rectangle
+from chamberopt.geometry.triangles import unit_normals
 
 MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
 SEEN_OUT = 1e-3  # m by which a part stands out of a side
@@ -55,9 +56,11 @@ MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area 
 # Flat faces looked at for jaws; least area of each [m²]; of two, share of all that stands out, and
 # how far apart they are over the part's size: no vice takes a shaft by its ends.
 MOST_FLAT, LEAST_JAW, LEAST_OF_ALL, JAWS_OPEN = 20, 30e-6, 0.15, 0.8
-DEEP = 8e-3  # m that jaws reach over a face, so that they do not tilt it
 SHALLOW = "SHALLOW GRIP"
 ALL_ROUND = "CUT ON SEVERAL SIDES"
+# Of a round face: how far its corners may be off a circle, over its radius, and the sum of its area
+# vectors over its area.
+OFF_ROUND, ALL_WAYS = 0.02, 0.2
 MOST_HOLDERS = 6  # that are tried
 CLEAR = 1.5  # distance of a mask from the target, over the diameter of a ball
 # Share of the target that a holder may keep from the balls; where no other holds the part.
@@ -126,9 +129,15 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
 
 
-def grips_poorly(made: Proposal, floor: Floor) -> bool:
-    """Return whether a part that goes out of its chamber is cut all round, or held by a rim."""
-    return _is_cut_all_round(made, floor) or SHALLOW in made.reasons.get("holder.kind", "")
+def grips_poorly(made: Proposal) -> bool:
+    """Return whether a part that goes out of its chamber is cut all round, or held by a rim.
+
+    So is one whose holder grips little of an end.
+    """
+    reason, holder = made.reasons.get("holder.kind", ""), made.design.holder
+    grip_mm = None if holder is None else holder.grip_mm
+    is_little = grip_mm is not None and grip_mm < 1e3 * DEEP
+    return is_little or ALL_ROUND in reason or SHALLOW in reason
 
 
 def _is_cut_all_round(made: Proposal, floor: Floor) -> bool:
@@ -160,11 +169,20 @@ def _outside_in_words(made: Proposal) -> str:
     if found := _flat_jaws(part.vertices, part.triangles, outside):
         jaws = found
     else:
-        known = (
+        known = [
             (one, np.where(rows_of(made.design, one.keys), outside, 0.0))
             for one in named_or_all(made.known)
-        )
-        areas = apart([(one, float(each.sum()), each) for one, each in known if each.any()])
+        ]
+        # One round face is held better than many flanks, such as those of splines.
+        axes = {"xyz".index(side[-1]) for side in _sides_out(made)}
+        rounds = [
+            (one, each)
+            for one, each in known
+            if not any("alike" in face for face in one.keys.get("faces", ()))
+            and any(_is_round(corners, each, k) for k in axes)
+        ]
+        used = rounds or known
+        areas = apart([(one, float(each.sum()), each) for one, each in used if each.any()])
         most = [(one, area) for one, area in areas if area > JAW_SHARE * areas[0][1]]
         jaws = ", ".join(
             f"{one.name} ({area_in_mm2(area)} of it)" for one, area in most[:MOST_JAWS]
@@ -181,6 +199,28 @@ def _sides_out(made: Proposal) -> list[str]:
     return sorted(
         f"{sign}{'xyz'[k]}" for sign, room in signs for k in range(3) if room[k] < -SEEN_OUT
     )
+
+
+def _is_round(corners: np.ndarray, outside: np.ndarray, axis: int) -> bool:
+    """Return whether what stands out of a surface is round about an axis, and long enough to hold.
+
+    All of it is as far from the axis, and it goes all round.
+
+    Args:
+        corners: of all triangles of the part [m], (m, 3, 3).
+        outside: area of each that belongs to the surface and may be clamped [m²], (m,).
+        axis: number of the axis.
+    """
+    own = outside > 0.0
+    if not own.any():
+        return False
+    across = np.delete(corners[own], axis, axis=2).reshape(-1, 2)
+    middle, radius = fitted_circle(across)
+    off = np.abs(np.linalg.norm(across - middle, axis=1) - radius).max()
+    normal, area = np.delete(unit_normals(corners[own]), axis, axis=1), outside[own]
+    is_even = np.linalg.norm(area @ normal) < ALL_WAYS * area.sum()
+    is_long = float(np.ptp(corners[own][..., axis])) >= DEEP
+    return bool(off < OFF_ROUND * radius and is_even and is_long)
 
 
 def _flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) -> str:

@@ -329,6 +329,33 @@ def test_what_is_buried_in_another_body_is_no_jaw(monkeypatch: pytest.MonkeyPatc
     assert words == "at +z by SHAFT (500000 mm² of it)"
 
 
+@pytest.mark.parametrize(("deep", "is_shallow"), [(2.5, True), (6.0, True), (9.0, False)])
+def test_jaws_reach_deep_over_the_faces_that_they_close_on(deep: float, is_shallow: bool) -> None:
+    bar = trimesh.creation.box((60, 15, deep))
+    across = np.abs(bar.face_normals[:, 1]) > 0.9
+    jaws = _flat_jaws(1e-3 * bar.vertices, bar.faces, np.where(across, 1e-6 * bar.area_faces, 0.0))
+    assert jaws.startswith("jaws on its flat faces that look to ")
+    assert (f"SHALLOW GRIP, {deep:g} mm" in jaws) == is_shallow
+
+
+@pytest.mark.parametrize(
+    ("sides", "closed", "is_cut"),
+    [
+        (["+x", "-x"], (), False),
+        (["+x", "+z"], (), False),
+        (["+x", "+y"], (), True),
+        (["+x", "+y", "-x"], ("-x", "y"), False),
+        (["+x", "-x", "+y", "-y"], ("x",), True),
+    ],
+)
+def test_a_part_that_goes_out_beside_each_other_is_cut_all_round(
+    monkeypatch: pytest.MonkeyPatch, sides: list[str], closed: tuple[str, ...], is_cut: bool
+) -> None:
+    monkeypatch.setattr(held_proposal, "_sides_out", lambda _: sides)
+    floor = SimpleNamespace(sizes=SimpleNamespace(closed=closed))
+    assert held_proposal._is_cut_all_round(None, floor) == is_cut  # type: ignore[arg-type]
+
+
 def test_jaws_close_on_flat_faces_back_to_back(monkeypatch: pytest.MonkeyPatch) -> None:
     """A channel: its flanges' inner faces look at each other, so that no jaws close on them."""
     channel = trimesh.creation.box((60, 40, 30))
