@@ -202,9 +202,9 @@ def _sides_out(made: Proposal) -> list[str]:
 
 
 def _is_round(corners: np.ndarray, outside: np.ndarray, axis: int) -> bool:
-    """Return whether what stands out of a surface is round about an axis, and long enough to hold.
+    """Return whether what stands out of a surface is a round about an axis that a clamp holds.
 
-    All of it is as far from the axis, and it goes all round.
+    All of it is as far from the axis, it goes all round, it is no bore, and it is long enough.
 
     Args:
         corners: of all triangles of the part [m], (m, 3, 3).
@@ -219,8 +219,10 @@ def _is_round(corners: np.ndarray, outside: np.ndarray, axis: int) -> bool:
     off = np.abs(np.linalg.norm(across - middle, axis=1) - radius).max()
     normal, area = np.delete(unit_normals(corners[own]), axis, axis=1), outside[own]
     is_even = np.linalg.norm(area @ normal) < ALL_WAYS * area.sum()
+    aside = np.delete(corners[own].mean(axis=1), axis, axis=1) - middle
+    is_outer = float(area @ (normal * aside).sum(axis=1)) > 0.0
     is_long = float(np.ptp(corners[own][..., axis])) >= DEEP
-    return bool(off < OFF_ROUND * radius and is_even and is_long)
+    return bool(off < OFF_ROUND * radius and is_even and is_outer and is_long)
 
 
 def _flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) -> str:

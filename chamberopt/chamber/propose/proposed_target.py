@@ -111,8 +111,8 @@ def propose_sizes(
 
     def room_below(points: np.ndarray) -> tuple[float, float]:
         """Return the sonotrode's distance and the height [m] for the points below the ceiling."""
-        width, high = float(np.ptp(points[:, :2], axis=0).max()), float(points[:, 2].max())
-        least = max(DISTANCE * ball, DISTANCE_SHARE * min(width, high), MIN_DISTANCE)
+        width = float(np.ptp(points[:, :2], axis=0).max())
+        least = max(DISTANCE * ball, DISTANCE_SHARE * min(width, top), MIN_DISTANCE)
         distance = 1e-3 * _up_mm(least * wider)
         height = 1e-3 * _up_mm(distance + below + above)
         if through and triangles is not None:

@@ -338,6 +338,25 @@ def test_jaws_reach_deep_over_the_faces_that_they_close_on(deep: float, is_shall
     assert (f"SHALLOW GRIP, {deep:g} mm" in jaws) == is_shallow
 
 
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_journal_is_round_and_splines_and_bores_are_not(axis: int) -> None:
+    tube = trimesh.creation.annulus(12.0, 20.0, 15.0, sections=48)
+    turned = np.roll(tube.triangles, axis - 2, axis=2)
+    radius = np.linalg.norm(tube.triangles_center[:, :2], axis=1)
+    level = np.abs(tube.face_normals[:, 2]) > 0.9
+    area = 1e-6 * tube.area_faces
+    for marked, is_round in [
+        (~level & (radius > 15.0), True),
+        (~level & (radius < 15.0), False),  # a bore
+        (level, False),
+        (~level & (radius > 15.0) & (tube.triangles_center[:, 0] > 0.0), False),  # half of it
+    ]:
+        outside = np.where(marked, area, 0.0)
+        assert held_proposal._is_round(1e-3 * turned, outside, axis) == is_round
+    low = np.where(np.arange(3) == axis, 0.4, 1.0) * 1e-3  # 6 mm long
+    assert not held_proposal._is_round(low * turned, np.where(~level, area, 0.0), axis)
+
+
 @pytest.mark.parametrize(
     ("sides", "closed", "is_cut"),
     [
