@@ -122,8 +122,8 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     if _is_cut_all_round(made, floor):
         text += (
             f"; {ALL_ROUND}: the part goes out through walls that do not lie opposite, so that its "
-            "openings are long and the room is narrow: give the whole part a room (--shape box, a "
-            "larger sonotrode), or another target"
+            "openings are long and the room is narrow: give the whole part a room (by a larger "
+            "sonotrode, or --pose standing), or take another target"
         )
     reasons = {**made.reasons, "holder.kind": text}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
@@ -166,9 +166,8 @@ def _outside_in_words(made: Proposal) -> str:
     corners = part.vertices[part.triangles]
     is_beyond = ((corners < low) | (corners > high)).any(axis=(1, 2))
     outside = np.where(is_beyond & ~part.target, part.area - chamber.exposed_area, 0.0)
-    if found := _flat_jaws(part.vertices, part.triangles, outside):
-        jaws = found
-    else:
+    jaws = _flat_jaws(part.vertices, part.triangles, outside)
+    if not jaws or SHALLOW in jaws:
         known = [
             (one, np.where(rows_of(made.design, one.keys), outside, 0.0))
             for one in named_or_all(made.known)
@@ -181,12 +180,13 @@ def _outside_in_words(made: Proposal) -> str:
             if not any("alike" in face for face in one.keys.get("faces", ()))
             and any(_is_round(corners, each, k) for k in axes)
         ]
-        used = rounds or known
+        used = rounds or ([] if jaws else known)
         areas = apart([(one, float(each.sum()), each) for one, each in used if each.any()])
         most = [(one, area) for one, area in areas if area > JAW_SHARE * areas[0][1]]
-        jaws = ", ".join(
-            f"{one.name} ({area_in_mm2(area)} of it)" for one, area in most[:MOST_JAWS]
-        )
+        if most:
+            jaws = ", ".join(
+                f"{one.name} ({area_in_mm2(area)} of it)" for one, area in most[:MOST_JAWS]
+            )
     return f"at {', '.join(_sides_out(made))}{f' by {jaws}' if jaws else ''}"
 
 

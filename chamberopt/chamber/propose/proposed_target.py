@@ -203,7 +203,7 @@ def _off_ledges(
     most = math.ceil(1e3 * (ends[1] - ends[0]))
     tried = (height + way * k for way in (-1e-3, 1e-3) for k in range(1, most + 1))
     inside = (one for one in tried if ends[0] - 1e-9 <= one <= ends[1] + 1e-9)
-    return next(filter(is_free, inside), height)
+    return round(next((one for one in inside if is_free(one)), height), 9)
 
 
 def middle_in_plan(points: np.ndarray) -> np.ndarray:
