@@ -12,7 +12,7 @@ import numpy as np
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import touched
-from chamberopt.chamber.checks.place_names import PART, one_of
+from chamberopt.chamber.checks.place_names import CEILING, PART, one_of, surface_names
 from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.propose.proposal import (
     Proposal,
@@ -143,8 +143,11 @@ def grips_poorly(made: Proposal) -> bool:
 def _is_cut_all_round(made: Proposal, floor: Floor) -> bool:
     """Return whether a part goes out through side walls of which none lies opposite.
 
-    A wall that a face of the part closes does not count: a plate is cut out round it anyway.
+    A wall that a face of the part closes does not count: a plate is cut out round it anyway. Nor is
+    a part cut that lies on the walls as a lid.
     """
+    if "z" in floor.sizes.closed or not (surface_names(made.chamber) == CEILING).any():
+        return False
     closed = {f"+{one}".replace("+-", "-") for one in floor.sizes.closed}
     through = {side[-1] for side in _sides_out(made) if side not in closed}
     return {"x", "y"} <= through

@@ -365,14 +365,20 @@ def test_a_journal_is_round_and_splines_and_bores_are_not(axis: int) -> None:
         (["+x", "+y"], (), True),
         (["+x", "+y", "-x"], ("-x", "y"), False),
         (["+x", "-x", "+y", "-y"], ("x",), True),
+        (["+x", "-x", "+y", "-y"], ("z",), False),  # a lid
     ],
 )
 def test_a_part_that_goes_out_beside_each_other_is_cut_all_round(
     monkeypatch: pytest.MonkeyPatch, sides: list[str], closed: tuple[str, ...], is_cut: bool
 ) -> None:
     monkeypatch.setattr(held_proposal, "_sides_out", lambda _: sides)
+    names = np.array(["the wall", "the ceiling"])
+    monkeypatch.setattr(held_proposal, "surface_names", lambda _: names)
+    made = SimpleNamespace(chamber=None)
     floor = SimpleNamespace(sizes=SimpleNamespace(closed=closed))
-    assert held_proposal._is_cut_all_round(None, floor) == is_cut  # type: ignore[arg-type]
+    assert held_proposal._is_cut_all_round(made, floor) == is_cut  # type: ignore[arg-type]
+    names[1] = "the part"  # it is the lid
+    assert not held_proposal._is_cut_all_round(made, floor)  # type: ignore[arg-type]
 
 
 def test_jaws_close_on_flat_faces_back_to_back(monkeypatch: pytest.MonkeyPatch) -> None:
