@@ -38,8 +38,11 @@ FORM = 'a number, a share such as "2 %", or [low, high] of these, such as ["-10 
 
 
 def iso_2768_m(length: float) -> float:
-    """Return the permissible deviation of a length by ISO 2768-1 class m, both in mm."""
-    return next(off for most, off in ISO_2768_M if length <= most)
+    """Return the permissible deviation of a length by ISO 2768-1 class m, both in mm.
+
+    A length above all of the table has the last one.
+    """
+    return next((off for most, off in ISO_2768_M if length <= most), ISO_2768_M[-1][1])
 
 
 def _deviation(side: object) -> tuple[float, bool]:
