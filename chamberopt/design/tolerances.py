@@ -31,7 +31,18 @@ TWINS = {"amplitude_um": ("amplitude_pv_um", 2.0), "amplitude_pv_um": ("amplitud
 # of sonats-et.com). The standard itself was not read, and no other tolerance of it.
 USUAL = {"amplitude_pv_um": 4.0}
 USUAL_IN_WORDS = "± 4 µm peak to valley (SAE AMS 2580A, Table 1, as SONATS quotes it)"
+# Permissible deviations of lengths, ISO 2768-1 class m: up to a nominal size, and either way [mm].
+# By heart: the standard could not be read here.
+ISO_2768_M = ((6.0, 0.1), (30.0, 0.2), (120.0, 0.3), (400.0, 0.5), (1000.0, 0.8), (2000.0, 1.2))
 FORM = 'a number, a share such as "2 %", or [low, high] of these, such as ["-10 %", "0 %"]'
+
+
+def iso_2768_m(length: float) -> float:
+    """Return the permissible deviation of a length by ISO 2768-1 class m, both in mm.
+
+    A length above all of the table has the last one.
+    """
+    return next((off for most, off in ISO_2768_M if length <= most), ISO_2768_M[-1][1])
 
 
 def _deviation(side: object) -> tuple[float, bool]:

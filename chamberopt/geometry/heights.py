@@ -1,4 +1,4 @@
-"""The height of a surface over an outline on the floor."""
+"""The height of a surface over an outline on the floor, and what of it is below a level."""
 
 from __future__ import annotations
 
@@ -50,3 +50,20 @@ def lowest_over(vertices: np.ndarray, triangles: np.ndarray, outline: np.ndarray
         height = (one[flat, 2] + u * az[flat] + v * bz[flat])[over]
         found = min(found, float(height.min(initial=math.inf)))
     return found
+
+
+def points_up_to(vertices: np.ndarray, triangles: np.ndarray, level: float) -> np.ndarray:
+    """Return points (k, 3) [m] whose hull is that of what of a closed surface is below a level.
+
+    They are its vertices up to the level, and the places where its edges cross it.
+
+    Args:
+        vertices, triangles: as of lowest_over.
+        level: height [m].
+    """
+    start, end = vertices[sides_of(triangles)].transpose(1, 0, 2)
+    below, above = start[:, 2] - level, end[:, 2] - level
+    cut = (below < 0.0) & (above > 0.0)  # an edge is a side of two triangles, one either way
+    share = (below[cut] / (below[cut] - above[cut]))[:, None]
+    crossings = start[cut] + share * (end[cut] - start[cut])
+    return np.concatenate([vertices[vertices[:, 2] <= level], crossings])

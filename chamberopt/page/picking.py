@@ -128,7 +128,8 @@ class Picker:
             posed = mesh.vertices @ rotation_matrix(turns).T
             posed[:, 2] -= posed[:, 2].min()
             top = float(posed[mesh.triangles[preview.target], 2].max())
-            sizes = propose_sizes(posed, top, max(design.shot.diameters), design.chamber.shape)
+            shape, ball = design.chamber.shape, max(design.shot.diameters)
+            sizes = propose_sizes(posed, top, ball, shape, triangles=mesh.triangles)
             changes |= {f"chamber.{key}": size for key, size in sizes.lengths_mm().items()}
             changes |= {f"part.offset_mm.{k}": 0.0 for k in (0, 1) if design.part.offset[k]}
         return changes

@@ -281,7 +281,8 @@ def _plan(design: Design, shape: str) -> dict[str, float | str]:
     # The part may stand beside the chamber's axis: with its mirror image, the axis is the middle.
     points = part.vertices - [0.0, 0.0, part.vertices[:, 2].min()]
     both = np.concatenate([points, points * [-1.0, -1.0, 1.0]])
-    corners = np.unique(part.mesh.triangles[part.target])
+    triangles = part.mesh.triangles
+    corners = np.unique(triangles[part.target])
     target = both[np.r_[corners, corners + len(points)]]
     return propose_sizes(
         both,
@@ -289,4 +290,5 @@ def _plan(design: Design, shape: str) -> dict[str, float | str]:
         max(design.shot.diameters),
         shape,
         target=None if is_within.all() else target,
+        triangles=np.concatenate([triangles, triangles + len(points)]),
     ).plan

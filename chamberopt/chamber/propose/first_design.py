@@ -18,6 +18,7 @@ from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.propose.held_proposal import (
     clamped_outside,
+    grips_poorly,
     hangs_by_a_face,
     held,
     is_firm,
@@ -64,6 +65,7 @@ from chamberopt.chamber.propose.proposed_end import (
     cut_shape,
     held_end,
     local_room,
+    root_out,
     strip,
 )
 from chamberopt.chamber.propose.proposed_floor import (
@@ -90,7 +92,7 @@ from chamberopt.common.progress import step
 from chamberopt.common.toml_fields import MAX_COORDINATE_MM
 from chamberopt.design.design import Design, validate
 from chamberopt.design.materials import CATALOGUE, USUAL, alloy, ball, balls
-from chamberopt.geometry.heights import lowest_over
+from chamberopt.geometry.heights import lowest_over, points_up_to
 from chamberopt.geometry.meshes.part_mesh import PartMesh, keep_part, read_part_cached
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import BY_SIZE, METRES_PER
@@ -99,7 +101,9 @@ from chamberopt.geometry.triangles import rotation_matrix
 LEAST_TOUCHED = 0.02  # share of the target that balls which are wished for have to touch
 REACHES = 0.95  # of a part's length, from which on a target reaches both of its ends
 AT_WALL = 2.0  # ball diameters from the target to the wall through which its end goes out
+OVER_RIM = (0.0, 2.5e-3, 5e-3)  # m over the ceiling at which a clamp may begin, as over a flange
 ROUNDED = 0.5e-3  # m by which sizes are rounded up
+FEW = 2  # sonotrodes side by side that are better than a room of which the part is held badly
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
@@ -294,6 +298,8 @@ def _proposed(
     if not (end or wanted.pose) and (hanging := _hanging(mesh, target, turns, diameter, wanted)):
         turns, pose_reason = hanging, ON_END
     shape = cut_shape(mesh, target.triangles, target.keys.get("box_mm"))
+    if end is not None and end.room_mm is not None:  # the room is round all of that
+        shape = cut_shape(mesh, np.ones(len(mesh.triangles), dtype=bool), end.room_mm)
     # Balls would lie on what holds an end at the side: it goes out through the wall instead.
     out = end.axis if end is not None and end.goes_out else None
     bores = find_bores(mesh, target.triangles)
@@ -379,6 +385,7 @@ def _proposed(
             raise refused
         return best
 
+    spare: tuple[Proposal, Floor] | None = None  # a room of which the part is held badly
     with step("building and checking the chamber") as progress:
         made, floor = built(is_local=goes_out)
         if not goes_out and (not floor.is_one_sonotrode or is_capped(made)):
@@ -388,7 +395,9 @@ def _proposed(
                     if not local.chamber.pieces_in_air:
                         local = clamped_outside(local, its_floor, wanted.shop)
                         local = padded(local, its_floor, target, wanted.shop)
-                    if faults(local) <= faults(made):
+                    if grips_poorly(local):
+                        spare = local, its_floor
+                    elif faults(local) <= faults(made):
                         made, floor = local, its_floor
     if made.chamber.pieces_in_air:
         with step("choosing what holds the part") as progress:
@@ -396,6 +405,10 @@ def _proposed(
             made = held(made, floor, target, above, bores, wanted.shop, progress)
     elif "holder" not in made.tables:
         made = clamped_outside(made, floor, wanted.shop)
+    is_small = floor.face is not None and made.sonotrode_count <= FEW
+    is_good = is_small and "holder" in made.tables
+    if spare is not None and not is_good and faults(spare[0]) <= faults(made):
+        made, floor = spare
     if turning is not None:
         with step("trying it on its axis, turning") as progress, suppress(InputError):
             other, its_floor = built(is_local=False, turning=turning)
@@ -408,7 +421,19 @@ def _proposed(
     made = only_touched(made, floor, wanted.shop)
     if wanted.ball_mm is not None and touched_share(made) < LEAST_TOUCHED:
         raise InputError(_too_large(made, shop.stock_mm(shot)))
-    return replace(made, reasons={**made.reasons, **_room_reason(made, floor)})
+    made = replace(made, reasons={**made.reasons, **_room_reason(made, floor)})
+    if spare is None or end is not None or wanted.pose is not None or not grips_poorly(made):
+        return made
+    upright = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, "standing")
+    by_root = root_out(mesh, target, turns, AT_WALL * diameter)
+    for pose, why, root in ((turns, pose_reason, by_root), (upright, ON_END, None)):
+        if root is not None or pose != turns:
+            with suppress(InputError):
+                other = _proposed(path, wanted, mesh, known, target, pose, why, root)
+                is_better = is_firm(other) and not grips_poorly(other) and not rests(other)
+                if is_better and other.sonotrode_count <= made.sonotrode_count:
+                    return other
+    return made
 
 
 def _takes_room(warning: DesignWarning) -> bool:
@@ -569,12 +594,13 @@ def _place(
         posed[:, 2] -= posed[:, 2].min()
         on_target = posed[np.unique(part.triangles[part.target])]
         top, around = float(on_target[:, 2].max()), on_target if is_local else None
-        sizes, shop = propose_sizes(posed, top, ball, shape, wider, around), wanted.shop
+        sizes = propose_sizes(posed, top, ball, shape, wider, around, part.triangles)
+        shop = wanted.shop
         out_at = sizes.height - sizes.distance
         if (
             sizes.through_ceiling
             and not is_local
-            and not can_be_clamped(posed, part.triangles, 2, out_at)
+            and not any(can_be_clamped(posed, part.triangles, 2, out_at + one) for one in OVER_RIM)
         ):  # a higher ceiling takes in the whole part
             sizes = propose_sizes(posed, float(posed[:, 2].max()), ball, shape, wider)
         local = None
@@ -713,15 +739,19 @@ def _room_reason(made: Proposal, floor: Floor) -> dict[str, str]:
 
 
 def _room_in_box(made: Proposal) -> str:
-    """Return in words how far each wall of an upright box is from the part, or from the target."""
+    """Return in words how far each wall of an upright box is from the part, or from the target.
+
+    What of the part is above the ceiling does not count.
+    """
     part, chamber = made.chamber.part, made.tables["chamber"]
+    below = points_up_to(part.vertices, part.triangles, 1e-3 * chamber["height_mm"])
     on_target = part.vertices[part.triangles[part.target]].reshape(-1, 3)
     beside, before = [], []
     for k, (name, key) in enumerate((("x", "length_mm"), ("y", "width_mm"))):
         for side, sign in (("-", -1.0), ("+", 1.0)):
             whole, target = (
                 0.5 * float(chamber[key]) - 1e3 * float((sign * one[:, k]).max())
-                for one in (part.vertices, on_target)
+                for one in (below, on_target)
             )
             if whole > 0.0:
                 beside.append(f"{whole:.3g} mm at {side}{name}")

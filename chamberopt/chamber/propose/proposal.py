@@ -26,7 +26,7 @@ from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.design.shapes.base import ParametricChamber
 from chamberopt.design.shot import ShotTable
-from chamberopt.design.tolerances import USUAL
+from chamberopt.design.tolerances import USUAL, iso_2768_m
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.triangles import areas
@@ -38,9 +38,6 @@ LARGEST_MM = allowed_range(ParametricChamber.model_fields["height_mm"])[1]  # si
 HEAVIEST_G = allowed_range(ShotTable.model_fields["mass_g"])[1]
 REPLICAS = 10  # the fewest that a wanted half-width takes
 CAPPED = "less than half a layer of balls"
-# Permissible deviations of lengths, ISO 2768-1 class m: up to a nominal size, and either way [mm].
-# By heart: the standard could not be read here.
-ISO_2768_M = ((6.0, 0.1), (30.0, 0.2), (120.0, 0.3), (400.0, 0.5), (1000.0, 0.8), (2000.0, 1.2))
 # Lengths that are set up. In plan the wall follows the sonotrode's face, with less clearance.
 LENGTHS = ("height_mm", "sonotrode_distance_mm")
 PEAK_TO_VALLEY_UM = USUAL["amplitude_pv_um"]
@@ -260,14 +257,9 @@ def propose_tolerances(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, flo
         tables: tables of the design file.
     """
     lengths = {key: tables["chamber"][key] for key in LENGTHS}
-    found = {f"chamber.{key}": _deviation_mm(one) for key, one in lengths.items()}
+    found = {f"chamber.{key}": iso_2768_m(one) for key, one in lengths.items()}
     set_ = {key: one for key, one in OF_AMPLITUDE.items() if key in tables["sonotrode"]}
     return found | {f"sonotrode.{key}": one for key, one in set_.items()}
-
-
-def _deviation_mm(length: float) -> float:
-    """Return the permissible deviation of a length, both in mm."""
-    return next(off for most, off in ISO_2768_M if length <= most)
 
 
 class Range(NamedTuple):

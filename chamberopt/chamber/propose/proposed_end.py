@@ -55,6 +55,7 @@ MARGIN_MM = 1.0  # of boxes round the part
 # may stand in the chamber [m]. It is straight as far as it is wider than STRAIGHT of its width;
 # jaws have the form of a root, which is wider than ROOT of it.
 CLAMPED, LONG_ENOUGH, INSIDE, ROOT = 0.75, 10e-3, 6e-3, 0.5
+DEEP = 7.5e-3  # m that jaws reach over a part, so that it does not tilt in them
 # Of a face that closes a chamber: cosine, share of the rectangle round the target, and how far it
 # may lie before the target's end [m]. The wall is that far behind it [m].
 FACING, CLOSES, BEFORE, BEHIND = 0.999, 0.5, 1e-5, 0.2e-3
@@ -102,6 +103,8 @@ class HeldEnd(NamedTuple):
     triangles: np.ndarray  # marks those of the end, (m,)
     goes_out: bool = False
     strips: Strips | None = None  # in which the target is peened, if this is one of them
+    # Box [mm] round what the room encloses, if it is not the target alone.
+    room_mm: list[list[float]] | None = None
 
 
 class Shape(NamedTuple):
@@ -197,6 +200,38 @@ def bare_end(mesh: PartMesh, target: Target, turns: Turns) -> HeldEnd | None:
     if not _is_one_piece(mesh, (way * own[mesh.triangles]).mean(axis=1) > cut):
         return None
     return HeldEnd(target, turns, way * np.eye(3)[axis], {}, of_end)
+
+
+def root_out(mesh: PartMesh, target: Target, turns: Turns, clear: float) -> HeldEnd | None:
+    """Return the end by which a part is held outside of a room that encloses all the rest.
+
+    It is the wider end of a part that lies, if the target leaves enough of it free.
+
+    Args:
+        turns: the pose [degrees].
+        clear: distance from the target of the wall through which it goes out [m].
+    """
+    axis = int(np.ptp(mesh.vertices, axis=0).argmax())
+    if abs(rotation_matrix(turns)[2, axis]) > LEVEL or "box_mm" in target.keys:
+        return None
+    own = mesh.vertices[:, axis]
+    on_target = own[np.unique(mesh.triangles[target.triangles])]
+
+    def wide_at(way: float, place: float) -> float:
+        return _width(mesh.vertices, mesh.triangles, way * own, place, axis)
+
+    wall = {way: float((way * on_target).max()) + clear for way in (1.0, -1.0)}
+    way = max(wall, key=lambda one: wide_at(one, wall[one]))
+    places, cut = way * own, wall[way]
+    out = float(places.max()) - cut
+    is_straight = wide_at(way, cut + (1.0 - TIP) * out) > ROOT * wide_at(way, cut) > 0.0
+    if out < DEEP or not is_straight:
+        return None
+    if not _is_one_piece(mesh, places[mesh.triangles].mean(axis=1) > cut):
+        return None
+    of_end = places[mesh.triangles].min(axis=1) > cut
+    inside = box_beyond(mesh, axis, way < 0.0, 1e3 * way * (cut - clear))
+    return HeldEnd(target, turns, way * np.eye(3)[axis], {}, of_end, True, None, inside)
 
 
 def strip(mesh: PartMesh, target: Target, turns: Turns, longest: float) -> HeldEnd | None:

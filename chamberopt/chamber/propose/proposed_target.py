@@ -18,12 +18,15 @@ import numpy as np
 from chamberopt.chamber.fixture import is_hole
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
+from chamberopt.design.tolerances import iso_2768_m
+from chamberopt.geometry.heights import points_up_to
 from chamberopt.geometry.meshes.part_mesh import PartMesh, select_triangles
 from chamberopt.geometry.triangles import (
     area_vectors,
     areas,
     border_edges,
     side_pairs,
+    sides_of,
     unit_vectors,
 )
 
@@ -32,6 +35,13 @@ from chamberopt.geometry.triangles import (
 SIDE_GAP, GAP_SHARE, MIN_GAP = 5.0, 0.15, 4e-3
 DISTANCE, DISTANCE_SHARE, MIN_DISTANCE = 6.0, 0.2, 8e-3
 ABOVE = 5.0  # ball diameters between target and ceiling
+CLOSEST = 0.6  # share of that which is left where the ceiling lies off a face of the part
+ROUNDS = 3  # in which what is below the ceiling and the sonotrode's distance follow each other
+# Edges of a part that turn by more are at one level if they lie within ONE_LEVEL [m]; they count if
+# together they are longer than this share of the rectangle round the part.
+LEVEL_EDGE_DEG, ONE_LEVEL, MUCH = 20.0, 1e-5, 0.05
+SEEN = 1e-3  # m of a part that stand out above a ceiling at least
+OVER_LEDGE = 2.0  # ball diameters between a face that looks up and a ceiling over it
 SHAPES = ("cylinder", "box", "prism", "conformal")
 TOLD = 0.5  # share of a surface that others named tell of, from which on it is not named
 LONG = 1.6  # least length over width of a part whose sides the walls follow
@@ -78,8 +88,12 @@ def propose_sizes(
     shape: str,
     wider: float = 1.0,
     target: np.ndarray | None = None,
+    triangles: np.ndarray | None = None,
 ) -> Sizes:
     """Return the sizes of a chamber of the named shape, with room for balls round the part.
+
+    A part that goes out through the ceiling needs room round what of it is below. Such a ceiling
+    lies off the part's level faces, so that it meets the same section however it is set up.
 
     Args:
         vertices: vertices of the turned part, with its lowest point at z = 0 [m], shape (n, 3).
@@ -88,17 +102,30 @@ def propose_sizes(
         wider: factor on the room beside, below and above the part.
         target: vertices of the target alone [m], shape (k, 3), for a chamber round the target whose
             walls the part goes out through; None for one round the part.
+        triangles: of the part, (m, 3), where all of its faces count; None to look at its vertices.
     """
     top = float(vertices[:, 2].max())
-    width = float(np.ptp(vertices[:, :2], axis=0).max())
-    distance = 1e-3 * _up_mm(
-        max(DISTANCE * ball, DISTANCE_SHARE * min(width, top), MIN_DISTANCE) * wider
-    )
     above = ABOVE * ball * wider
     through = top > target_top + 2.0 * above
     below = target_top if through else top
-    height = 1e-3 * _up_mm(distance + below + above)
-    inside = vertices[vertices[:, 2] <= height - distance + 1e-9] if target is None else target
+
+    def room_below(points: np.ndarray) -> tuple[float, float]:
+        """Return the sonotrode's distance and the height [m] for the points below the ceiling."""
+        width = float(np.ptp(points[:, :2], axis=0).max())
+        least = max(DISTANCE * ball, DISTANCE_SHARE * min(width, top), MIN_DISTANCE)
+        distance = 1e-3 * _up_mm(least * wider)
+        height = 1e-3 * _up_mm(distance + below + above)
+        if through and triangles is not None:
+            ends = distance + below + CLOSEST * above, min(height + above, distance + top - SEEN)
+            height = _off_ledges(vertices, triangles, distance, height, ends, ball)
+        return distance, height
+
+    distance, height = room_below(vertices)
+    inside = vertices if target is None else target
+    if target is None and through:
+        for _ in range(ROUNDS):
+            inside = _up_to(vertices, triangles, height - distance)
+            distance, height = room_below(inside)
     middle = middle_in_plan(vertices if target is None else target)  # on the chamber's axis
     half = np.abs(inside[:, :2] - middle).max(axis=0)
     gap = max(SIDE_GAP * ball, GAP_SHARE * 2.0 * float(half.max()), MIN_GAP) * wider
@@ -111,6 +138,72 @@ def propose_sizes(
         "conformal": {"outline": "hull", "gap_mm": _up_mm(gap)},
     }
     return Sizes(shape, plans[shape], distance, height, gap, through, below)
+
+
+def _up_to(vertices: np.ndarray, triangles: np.ndarray | None, level: float) -> np.ndarray:
+    """Return points (k, 3) [m] round what of a part is not above a level [m]."""
+    if triangles is None:
+        return vertices[vertices[:, 2] <= level + 1e-9]
+    return points_up_to(vertices, triangles, level)
+
+
+def _ledges(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the heights [m] at which a part's section changes, and which look up, both (k,).
+
+    They are those of level edges that are long together: where the part turns sharply, as at a face
+    or a chamfer, and the lowest and highest lines of rounds, as of a level bore.
+    """
+    pairs = side_pairs(triangles)
+    ends = vertices[sides_of(triangles)[pairs[:, 0]]]
+    is_level = np.abs(ends[:, 1, 2] - ends[:, 0, 2]) < ONE_LEVEL
+    pairs, ends = pairs[is_level], ends[is_level]
+    normal = unit_vectors(area_vectors(vertices, triangles))[pairs // 3]
+    # A side goes from a corner of its triangle to the next; the third corner is opposite.
+    opposite = vertices[triangles[pairs // 3, (pairs % 3 + 2) % 3], 2] - ends[:, :1, 2]
+    is_turn = (opposite >= -ONE_LEVEL).all(axis=1) | (opposite <= ONE_LEVEL).all(axis=1)
+    cosine = np.einsum("ij,ij->i", normal[:, 0], normal[:, 1])
+    used = is_turn | (cosine < np.cos(np.radians(LEVEL_EDGE_DEG)))
+    up = normal[used, :, 2].sum(axis=1) > 0.0
+    length = np.linalg.norm(ends[used, 1] - ends[used, 0], axis=1)
+    key = 2.0 * np.round(ends[used, 0, 2] / ONE_LEVEL) + up
+    keys, row = np.unique(key, return_inverse=True)
+    around = 2.0 * float(np.ptp(vertices[:, :2], axis=0).sum())
+    keys = keys[np.bincount(row, length, len(keys)) > MUCH * around]
+    return ONE_LEVEL * np.floor(0.5 * keys), keys % 2.0 == 1.0
+
+
+def _off_ledges(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    distance: float,
+    height: float,
+    ends: tuple[float, float],
+    ball: float,
+) -> float:
+    """Return the height [m] of a ceiling between two ends that is off all ledges of a part.
+
+    It keeps twice its tolerance off them, so that the ceiling meets one section of the part, and
+    over those that look up two balls. It is lowered, so that the face goes out and no ball lies on
+    it, or else raised. It stays where there is no such height.
+
+    Args:
+        vertices, triangles, ball: as of propose_sizes.
+        distance, height, ends: over the sonotrode [m]: the part's lowest point, and the ceiling.
+    """
+    levels, up = _ledges(vertices, triangles)
+    off = 2e-3 * iso_2768_m(1e3 * height)
+    over = np.where(up, max(OVER_LEDGE * ball, off), off)
+
+    def is_free(one: float) -> bool:
+        above = one - distance - levels
+        return not ((above > 1e-9 - off) & (above < over - 1e-9)).any()
+
+    if is_free(height):
+        return height
+    most = math.ceil(1e3 * (ends[1] - ends[0]))
+    tried = (height + way * k for way in (-1e-3, 1e-3) for k in range(1, most + 1))
+    inside = (one for one in tried if ends[0] - 1e-9 <= one <= ends[1] + 1e-9)
+    return round(next((one for one in inside if is_free(one)), height), 9)
 
 
 def middle_in_plan(points: np.ndarray) -> np.ndarray:

@@ -22,6 +22,7 @@ from chamberopt.chamber.propose.proposed_end import (
     cut_shape,
     held_end,
     local_room,
+    root_out,
     strip,
 )
 from chamberopt.chamber.propose.proposed_mask import rows_of, unlike_settings
@@ -304,3 +305,25 @@ def test_a_crank_pin_gets_a_chamber_between_its_webs(tmp_path: Path) -> None:
     assert sleeve.covered_target == 0.0
     assert "a sleeve on PIN" in made.reasons["mask.margin_mm"]
     assert "MANY BALLS" not in made.reasons["shot.diameter_mm"]  # 949, and 3,445 under all of it
+
+
+@pytest.mark.parametrize(("deep", "is_held"), [(12.0, True), (9.0, False)])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_root_goes_out_of_a_room_round_all_the_rest(
+    deep: float, is_held: bool, way: float
+) -> None:
+    """A blade along x on a root of so many mm, peened where they meet."""
+    blade = Manifold.cube((60, 3, 15)).translate([-60, -1.5, -7.5])
+    body = blade + Manifold.cube((deep, 25, 30)).translate([0, -12.5, -15])
+    mesh, drawn = part_of(body if way > 0.0 else body.mirror((1, 0, 0)))
+    places = way * drawn.triangles_center[:, 0]
+    target = Target({}, np.abs(places) < 1e-6, "")
+    end = root_out(mesh, target, UPRIGHT, 2e-3)
+    assert (end is not None) == is_held
+    if end is not None:
+        assert end.goes_out
+        assert end.axis.tolist() == [way, 0.0, 0.0]
+        inside = np.array(end.room_mm)[:, 0]
+        assert sorted(way * inside) == pytest.approx([-61.0, 0.0])
+    standing = (0.0, 90.0, 0.0)
+    assert root_out(mesh, target, standing, 2e-3) is None

@@ -332,6 +332,58 @@ def test_what_is_buried_in_another_body_is_no_jaw(monkeypatch: pytest.MonkeyPatc
     assert words == "at +z by SHAFT (500000 mm² of it)"
 
 
+@pytest.mark.parametrize(("deep", "is_shallow"), [(2.5, True), (6.0, True), (9.0, False)])
+def test_jaws_reach_deep_over_the_faces_that_they_close_on(deep: float, is_shallow: bool) -> None:
+    bar = trimesh.creation.box((60, 15, deep))
+    across = np.abs(bar.face_normals[:, 1]) > 0.9
+    jaws = _flat_jaws(1e-3 * bar.vertices, bar.faces, np.where(across, 1e-6 * bar.area_faces, 0.0))
+    assert jaws.startswith("jaws on its flat faces that look to ")
+    assert (f"SHALLOW GRIP, {deep:g} mm" in jaws) == is_shallow
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_journal_is_round_and_splines_and_bores_are_not(axis: int) -> None:
+    tube = trimesh.creation.annulus(12.0, 20.0, 15.0, sections=48)
+    turned = np.roll(tube.triangles, axis - 2, axis=2)
+    radius = np.linalg.norm(tube.triangles_center[:, :2], axis=1)
+    level = np.abs(tube.face_normals[:, 2]) > 0.9
+    area = 1e-6 * tube.area_faces
+    for marked, is_round in [
+        (~level & (radius > 15.0), True),
+        (~level & (radius < 15.0), False),  # a bore
+        (level, False),
+        (~level & (radius > 15.0) & (tube.triangles_center[:, 0] > 0.0), False),  # half of it
+    ]:
+        outside = np.where(marked, area, 0.0)
+        assert held_proposal._is_round(1e-3 * turned, outside, axis) == is_round
+    low = np.where(np.arange(3) == axis, 0.4, 1.0) * 1e-3  # 6 mm long
+    assert not held_proposal._is_round(low * turned, np.where(~level, area, 0.0), axis)
+
+
+@pytest.mark.parametrize(
+    ("sides", "closed", "is_cut"),
+    [
+        (["+x", "-x"], (), False),
+        (["+x", "+z"], (), False),
+        (["+x", "+y"], (), True),
+        (["+x", "+y", "-x"], ("-x", "y"), False),
+        (["+x", "-x", "+y", "-y"], ("x",), True),
+        (["+x", "-x", "+y", "-y"], ("z",), False),  # a lid
+    ],
+)
+def test_a_part_that_goes_out_beside_each_other_is_cut_all_round(
+    monkeypatch: pytest.MonkeyPatch, sides: list[str], closed: tuple[str, ...], is_cut: bool
+) -> None:
+    monkeypatch.setattr(held_proposal, "_sides_out", lambda _: sides)
+    names = np.array(["the wall", "the ceiling"])
+    monkeypatch.setattr(held_proposal, "surface_names", lambda _: names)
+    made = SimpleNamespace(chamber=None)
+    floor = SimpleNamespace(sizes=SimpleNamespace(closed=closed))
+    assert held_proposal._is_cut_all_round(made, floor) == is_cut  # type: ignore[arg-type]
+    names[1] = "the part"  # it is the lid
+    assert not held_proposal._is_cut_all_round(made, floor)  # type: ignore[arg-type]
+
+
 def test_jaws_close_on_flat_faces_back_to_back(monkeypatch: pytest.MonkeyPatch) -> None:
     """A channel: its flanges' inner faces look at each other, so that no jaws close on them."""
     channel = trimesh.creation.box((60, 40, 30))

@@ -8,7 +8,9 @@ from chamberopt.chamber.propose.proposed_target import (
     BY_SHAPE,
     BY_SIZE,
     CREASE_DEG,
+    Sizes,
     crease_deg,
+    propose_sizes,
     propose_target,
     surfaces,
 )
@@ -83,3 +85,57 @@ def test_a_rim_of_teeth_is_chosen_though_the_hub_is_larger(count: int, turn: lis
 def test_few_lobes_or_shallow_waves_are_no_teeth(count: int, deep: float) -> None:
     mesh, _ = part_of(toothed(count, deep))
     assert propose_target(mesh, surfaces(mesh), []).reason.endswith(BY_SIZE)
+
+
+def flanged(chamfer: float, top: float = 6.0) -> Manifold:
+    """A shaft of 60 mm that stands on a target of 30 mm, with a flange above it [mm]."""
+    side = 20.0 + np.array([0.0, top - chamfer, top])
+    outline = [[0, 0], [10, 0], [10, 20], [25, side[0]], [25, side[1]], [25 - chamfer, side[2]]]
+    return Manifold.revolve(CrossSection([[*outline, [8, side[2]], [8, 60], [0, 60]]]), 60)
+
+
+def sized(body: Manifold, target_mm: float, ball_mm: float) -> Sizes:
+    mesh, _ = part_of(body)
+    ends = 1e-3 * target_mm, 1e-3 * ball_mm
+    return propose_sizes(mesh.vertices, *ends, "box", triangles=mesh.triangles)
+
+
+@pytest.mark.parametrize("target_mm", [18.0, 19.0, 19.5, 21.0, 22.0, 23.0])
+@pytest.mark.parametrize("chamfer", [0.2, 1.0])
+def test_a_ceiling_is_off_the_faces_and_chamfers_of_a_part(
+    target_mm: float, chamfer: float
+) -> None:
+    """Its height has a tolerance of 0.3 mm (ISO 2768-m), of which it keeps two."""
+    sizes = sized(flanged(chamfer), target_mm, 1.0)
+    assert sizes.through_ceiling
+    ceiling = 1e3 * (sizes.height - sizes.distance)
+    for face in (20.0, 26.0 - chamfer, 26.0):
+        assert abs(ceiling - face) >= 0.59
+        assert not 0.0 < ceiling - face < 1.99 or face == 20.0  # no narrow gap over the flange
+    assert ceiling >= target_mm + 2.99
+
+
+def test_a_ceiling_in_no_face_stays() -> None:
+    sizes = sized(flanged(0.2, 20.0), 25.0, 1.0)
+    assert 1e3 * (sizes.height - sizes.distance) == pytest.approx(30.0)
+
+
+@pytest.mark.parametrize("begins", [26.0, 27.0, 35.0])
+def test_room_is_left_beside_what_is_below_the_ceiling(begins: float) -> None:
+    """A bar of 30 x 10 mm whose wide head begins at the ceiling or over it [mm]."""
+    bar = Manifold.cube((30, 10, 100)).translate([-15, -5, 0])
+    head = Manifold.cube((80, 10, 100 - begins)).translate([-40, -5, begins])
+    sizes = sized(bar + head, 21.0, 1.0)
+    assert sizes.plan["length_mm"] == 30.0 + 2.0 * 5.0
+    assert 1e3 * (sizes.height - sizes.distance) < begins - 0.5
+
+
+def test_a_long_side_is_cut_where_it_meets_the_ceiling() -> None:
+    """A wedge without corners between its ends is 40 mm wide below and 120 mm above."""
+    wedge = Manifold.hull_points(
+        [[x, y, 0.0] for x in (-20, 20) for y in (-5, 5)]
+        + [[x, y, 200.0] for x in (-60, 60) for y in (-5, 5)]
+    )
+    sizes = sized(wedge, 20.0, 1.0)
+    wide = 40.0 + 80.0 * 1e3 * (sizes.height - sizes.distance) / 200.0
+    assert sizes.plan["length_mm"] == pytest.approx(wide + 2e3 * sizes.gap, abs=1.0)
