@@ -14,7 +14,7 @@ from chamberopt.chamber.checks.check import touched
 from chamberopt.chamber.flexure import softness_of_part
 from chamberopt.pictures.actors import FAULT, NO_RENDER, add_edges, body_meanings
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, pushed_back, seen_area
-from chamberopt.pictures.charts.colours import BLUE, KINDS
+from chamberopt.pictures.charts.colours import KINDS
 from chamberopt.pictures.panels import (
     BORDER,
     SIZE,
@@ -44,14 +44,14 @@ COLOURS = {
 # Restitution of a thin part over that of a rigid one, by bands, and their colours: greens, which
 # mean nothing else in the picture.
 BANDS = (0.5, 0.7, 0.9, 0.98)
-SOFTER = "flexure, the restitution of the thin target over that of a rigid part"
+SOFTER = "flexure, the restitution of the thin target over that of a rigid part, where below 0.98"
 BAND_COLOURS = {
     PLAIN: COLOURS[PLAIN],
     1: ("#00441b", "below 0.5"),
     2: ("#238b45", "0.5 to 0.7"),
     3: ("#74c476", "0.7 to 0.9"),
     4: ("#c7e9c0", "0.9 to 0.98"),
-    5: (BLUE, "0.98 and more"),
+    5: COLOURS[MARKED],
 }
 CLEAR = 0.05  # mm: what stands out of the room by less does not
 ALL = 0.999  # share of the target's area from which it is wholly in the chamber
@@ -146,7 +146,7 @@ def render_part(job: dict[str, Any]) -> None:
         bands = np.where(marked | missed, 1 + np.searchsorted(BANDS, softness, "right"), PLAIN)
         part, shown = _coloured(job, bands, beyond=False)
         rows.append(Row(f"{job['title']}: {SOFTER}", _panels(job, part, shown, BAND_COLOURS)))
-        legend += [BAND_COLOURS[k] for k in np.unique(bands) if k != PLAIN]
+        legend += [one for k in np.unique(bands) if (one := BAND_COLOURS[k]) not in legend]
     write_page(job["picture"], rows, legend, remarks=[f"part as it stands: {size_text(part)}"])
 
 
