@@ -336,8 +336,9 @@ def moved_openings(chamber: Chamber) -> str:
             if _is_elsewhere(one, near := _nearest(one, other)):
                 before, after = (x and format_point(np.round(x.place, 4)) for x in (one, near))
                 return (
-                    f"OPENINGS MOVE in the second pose, one from {before} to {after or 'none'} "
-                    "in the chamber's frame: a second wall or insert, and jaws that suit it"
+                    f"OPENINGS MOVE in the second pose, one from {before} in the "
+                    f"chamber's frame to {after or 'none'}: a second wall or insert, and jaws that "
+                    "suit it"
                 )
     return ""
 

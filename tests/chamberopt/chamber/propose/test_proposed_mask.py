@@ -89,7 +89,8 @@ def test_openings_that_move_in_a_second_pose_are_told(monkeypatch: pytest.Monkey
 
     assert told() == told([here, top], [top, here]) == ""
     assert told([here], [up]).startswith(
-        "OPENINGS MOVE in the second pose, one from (30, 0, 15) mm to (30, 0, 17) mm in the chamber's frame: a second wall"
+        "OPENINGS MOVE in the second pose, one from (30, 0, 15) mm in the chamber's frame to "
+        "(30, 0, 17) mm: a second wall"
     )
     assert " to none: " in told([here], [top])
     wider = here._replace(size=(0.02, 0.012))
