@@ -12,7 +12,7 @@ import trimesh
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import warnings
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
-from chamberopt.chamber.propose import proposed_steps
+from chamberopt.chamber.propose import proposal
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.held_proposal import rests
 from chamberopt.chamber.propose.pose import Pose, end_to_wall, pose_by_size
@@ -294,7 +294,7 @@ def test_a_warning_of_both_poses_is_no_reason_against_the_second(
     lying = replace(poses["lying"], warnings=(rest(1, "the holder"),))
 
     def pose_two(more: list[DesignWarning]) -> Proposal:
-        monkeypatch.setattr(proposed_steps, "warnings", lambda design, chamber: [*both, *more])
+        monkeypatch.setattr(proposal, "warnings", lambda design, chamber: [*both, *more])
         return propose_second_pose(lying, uneven(900.0), lambda *_: measured(400.0))[0]
 
     assert pose_two([]).design.steps
