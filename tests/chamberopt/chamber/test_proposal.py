@@ -219,7 +219,7 @@ def test_what_faces_away_is_offered_for_leaving_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The heel ends of a bevel gear's teeth face away from the sonotrode, its apex down."""
-    monkeypatch.setattr("chamberopt.chamber.propose.proposed_mask.met_area", lambda *_: (0.0, 1.0))
+    monkeypatch.setattr("chamberopt.chamber.propose.proposed_mask.met_beside", lambda *_: [])
     monkeypatch.setattr("chamberopt.chamber.propose.proposed_mask.open_holes", lambda _: "")
     mesh = read_part(FOUR_PARTS["bevel_gear"].write(tmp_path), "mm")
     known = surfaces(mesh)
