@@ -30,7 +30,9 @@ def run(code: str, folder: Path) -> str:
     return answer.stdout
 
 
-@pytest.mark.parametrize("snippet", SNIPPETS, ids=["toolkit", "simulator"])
+@pytest.mark.parametrize(
+    "snippet", [pytest.param(SNIPPETS[0], marks=pytest.mark.long, id="toolkit"), *SNIPPETS[1:]]
+)
 def test_the_readmes_python_runs_as_printed(snippet: str, tmp_path: Path) -> None:
     designs = tmp_path / "designs"
     designs.mkdir()
@@ -59,6 +61,7 @@ def test_the_page_for_science_prints_what_it_shows(tmp_path: Path) -> None:
     np.testing.assert_allclose(seen, expected, rtol=0.1, atol=0.02)
 
 
+@pytest.mark.long
 def test_the_page_on_python_runs_as_one_program(tmp_path: Path) -> None:
     pytest.importorskip("pandas")
     for name in ("designs", "studies"):

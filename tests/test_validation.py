@@ -45,6 +45,7 @@ def test_a_limit_is_as_uncertain_as_the_line_is_bad() -> None:
     assert peening_cylinder.without_contacts(contacts, bent)[1] > 10.0 * half_width
 
 
+@pytest.mark.long
 def test_speed_goes_with_amplitude_where_restitution_is_constant() -> None:
     found, half_width = peening_cylinder.exponent(peening_cylinder.constant(0.91), 50)
     assert abs(found - 1.0) < 0.05

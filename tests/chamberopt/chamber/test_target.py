@@ -160,6 +160,7 @@ def with_reachable(reachable: bool, **values: float) -> Design:
     return design.model_copy(update={"part": design.part.model_copy(update={"target": target})})
 
 
+@pytest.mark.long
 def test_what_the_shot_cannot_touch_can_be_left_out_of_the_target() -> None:
     """Tooth roots less round than the balls are left out, and more of them for larger balls.
 

@@ -67,6 +67,7 @@ def test_turns_are_simple_where_that_is_as_good(tmp_path: Path) -> None:
         assert square_to_walls(turned, (0.0, 0.0, 0.0))[2] == pytest.approx(needed)
 
 
+@pytest.mark.long
 def test_a_long_part_hangs_where_no_sonotrode_carries_it_lying(tmp_path: Path) -> None:
     """A strip's two broad faces stand upright, whether it lies on its edge or hangs by an end."""
     strip = trimesh.creation.box((170, 5, 36))

@@ -39,6 +39,7 @@ def of_front(front: Served) -> dict[str, Any]:
     return dict(json.loads(front.get("/front").read()))
 
 
+@pytest.mark.long
 def test_a_part_becomes_a_design_that_opens(front: Served, tmp_path: Path) -> None:
     box = trimesh.creation.box((30.0, 20.0, 10.0)).export(file_type="stl")
     for _ in range(2):  # again: the same bytes are the same part

@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import pytest
 import trimesh
 
 from tests.chamberopt.page.browser_page import Page
@@ -117,6 +118,7 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
         served.process.communicate()
 
 
+@pytest.mark.long
 def test_a_proposal_takes_the_place_of_what_was_seen_of_the_part(tmp_path: Path) -> None:
     """The ticked name is lit no more, and a distance is not measured from a place on the part."""
     body = trimesh.creation.box((30.0, 20.0, 10.0))

@@ -33,6 +33,7 @@ def steps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]
     }
 
 
+@pytest.mark.long
 @needs_opengl
 def test_a_window_shows_what_its_keys_say(steps: dict[str, dict[str, Any]]) -> None:
     def first(step: str) -> dict[str, Any]:

@@ -376,6 +376,7 @@ def test_a_corner_of_the_bounds_that_is_no_design_is_a_penalty_with_the_reason(
     assert result.best.feasible
 
 
+@pytest.mark.long
 def test_every_candidate_has_the_target_that_the_start_can_reach(tmp_path: Path) -> None:
     """A larger ball would reach, and so have to cover, less of the gear's tooth flanks."""
     target = GEAR.part.target.model_copy(update={"reachable": True})

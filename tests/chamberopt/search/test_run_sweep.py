@@ -213,6 +213,7 @@ def test_the_command_line_maps_a_study(tmp_path: Path, capsys) -> None:
     assert "--grid, --sobol: neither given" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_from_python_it_is_the_same(tmp_path: Path) -> None:
     """Times, dates and the digests of files with times apart."""
 

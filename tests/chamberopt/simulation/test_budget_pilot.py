@@ -68,6 +68,7 @@ def test_a_rough_intensity_takes_few_dents() -> None:
     assert rough.factor > full.factor
 
 
+@pytest.mark.long
 def test_what_takes_too_long_is_not_looked_at_to_its_end() -> None:
     """Even dents cover 98 % after ln 50 over the rate of their areas; 95 % of it is a bound."""
     design = PLATE.changed({"effects.friction": None})

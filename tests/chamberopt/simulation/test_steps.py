@@ -92,6 +92,7 @@ def test_each_side_of_a_turned_plate_has_what_its_own_step_threw() -> None:
     assert found.reachable > 0.999
 
 
+@pytest.mark.long
 def test_uncovered_shares_of_steps_in_one_pose_multiply() -> None:
     """On the side that both steps peen, 1 - c = (1 - c1) (1 - c2), whatever their order."""
     fine = {"name": "fine", "shot": {"diameter_mm": 2.0}}
@@ -135,6 +136,7 @@ def test_a_step_that_hits_nothing_changes_nothing() -> None:
     assert found.metrics["steps.idle.mean_coverage"].value == 0.0
 
 
+@pytest.mark.long
 def test_errors_of_a_calibration_are_in_the_figures_of_each_step() -> None:
     """By Avrami's law d C / d ln x = (1 - C) x, and x goes with the hardness to the power -1/2."""
     design = plate({"name": "again"}, **{"part.target": LOWER["target"]})

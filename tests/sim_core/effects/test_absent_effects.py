@@ -109,6 +109,7 @@ def test_every_effect_is_in_the_table() -> None:
     assert set(KEPT) == set(PRESENT) == set(Physics._fields) - {"surface"}
 
 
+@pytest.mark.long
 def test_a_rigid_face_has_no_profile(bare: dict[str, list[str]]) -> None:
     """A profile is part of a vibration, so the loop keeps it under its own name."""
     assert (

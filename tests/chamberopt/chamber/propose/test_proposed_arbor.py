@@ -206,6 +206,7 @@ def turns_on_an_arbor(made: Proposal) -> None:
     assert not made.warnings
 
 
+@pytest.mark.long
 def test_a_ring_is_proposed_to_turn_on_an_arbor(tmp_path: Path) -> None:
     """Its outside is a target alike all round; at rest balls would lie on its upper face."""
     trimesh.creation.annulus(10.0, 30.0, 12.0, sections=24).export(tmp_path / "ring.stl")

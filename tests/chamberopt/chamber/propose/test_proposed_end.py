@@ -287,6 +287,7 @@ def test_a_setting_whose_strip_hangs_otherwise_is_named(tmp_path: Path) -> None:
     assert said.startswith(f"SETTINGS 1 of {made.settings} need")
 
 
+@pytest.mark.long
 def test_a_crank_pin_gets_a_chamber_between_its_webs(tmp_path: Path) -> None:
     """The webs are 36 mm apart, from fillet to fillet."""
     made = propose(EIGHT_PARTS["crank_pin"].write(tmp_path), Wanted(), lambda _: [])

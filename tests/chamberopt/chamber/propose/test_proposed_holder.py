@@ -172,6 +172,7 @@ def test_a_jaw_holds_an_end_of_any_form_beside_the_target() -> None:
         assert high > 70.0
 
 
+@pytest.mark.long
 def test_a_leaf_is_held_by_an_end_left_out_of_its_target(tmp_path: Path) -> None:
     """Broad sides reach both ends: a block on the edge of the upper one alone holds no leaf."""
     trimesh.creation.box((170, 5, 36)).subdivide_to_size(20.0).export(tmp_path / "leaf.stl")

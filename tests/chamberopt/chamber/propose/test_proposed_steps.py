@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
-from chamberopt.chamber.propose import proposed_steps
+from chamberopt.chamber.propose import proposal, proposed_steps
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_budget import Measured, propose_budget
@@ -128,12 +128,12 @@ def test_what_stands_against_finer_balls_is_told(
         (WarningKind.PACKING, "they hinder each other, at", "they hinder each other"),
     ):
         one = DesignWarning(kind, text)
-        monkeypatch.setattr(proposed_steps, "warnings", lambda *_, said=one: [said])
+        monkeypatch.setattr(proposal, "warnings", lambda *_, said=one: [said])
         _, why = with_finer_balls(coarse, found, FINER, lambda _: None)
         assert why == (harm or "no pilot resolved both sizes")
 
     low = coarse.design.chamber.height_mm
-    monkeypatch.setattr(proposed_steps, "warnings", lambda *_: [])
+    monkeypatch.setattr(proposal, "warnings", lambda *_: [])
     monkeypatch.setattr(
         proposed_steps,
         "jam_gaps",

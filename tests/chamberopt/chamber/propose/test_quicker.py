@@ -88,6 +88,7 @@ def test_an_end_is_turned_to_the_wall_along_x(axis: list[float]) -> None:
     np.testing.assert_allclose(rotation_matrix(turns) @ axis, [1.0, 0.0, 0.0], atol=1e-6)
 
 
+@pytest.mark.long
 def test_a_long_bar_is_held_in_each_pose(poses: dict[Pose | None, Proposal]) -> None:
     for pose, made in poses.items():
         assert made.chamber.pieces_in_air == 0, pose
