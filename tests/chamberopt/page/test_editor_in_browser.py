@@ -67,7 +67,6 @@ def test_a_number_changes_the_shape_the_facts_and_one_line(opened: Page) -> None
     assert said == [one.text for one in told]
 
 
-@pytest.mark.long
 def test_what_is_drawn_stays_where_no_form_has_changed(opened: Page) -> None:
     page, held, is_held = opened.page, [], True
     drawn = """async () => {
@@ -391,7 +390,6 @@ def test_the_face_under_the_pointer_lights_up(opened: Page) -> None:
     expect(view).not_to_have_attribute("data-highlight", "2")
 
 
-@pytest.mark.long
 def test_the_face_of_a_cad_file_lights_up_and_is_taken(opened: Page, tmp_path: Path) -> None:
     """A fillet of a shaft, which goes on into its journal without a crease."""
     pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
@@ -518,7 +516,6 @@ def test_shape_and_holder_are_chosen_in_words(opened: Page) -> None:
     assert page.locator("#undo").is_disabled()
 
 
-@pytest.mark.long
 def test_what_is_settled_is_taken_out_of_the_file(opened: Page) -> None:
     page, file = opened.page, opened.served.folder / "design.toml"
     text = file.read_text()
@@ -550,7 +547,6 @@ def test_what_is_settled_is_taken_out_of_the_file(opened: Page) -> None:
     expect(listed).to_have_count(0, timeout=WAIT)
 
 
-@pytest.mark.long
 def test_a_step_is_added_and_shown(opened: Page) -> None:
     page = opened.page
     page.click("#new-step summary")
@@ -587,7 +583,6 @@ def test_what_is_refused_is_said_and_the_newest_counts(opened: Page) -> None:
     expect(opened.page.locator("#error")).to_be_hidden()
 
 
-@pytest.mark.long
 def test_a_click_picks_the_face_and_turns_it_down(opened: Page) -> None:
     opened.tab("target")
     opened.page.click("#whole")
