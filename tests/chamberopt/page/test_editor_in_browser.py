@@ -21,7 +21,8 @@ from tests.chamberopt.page.conftest import Served
 from tests.helpers.eight_parts import KEPT_ASIDE
 from tests.helpers.results.browser import WAIT, chromium, expect, needs_chromium
 
-pytestmark = needs_chromium
+# On a busy machine with two cores the browser is starved beside other tests, and clicks time out.
+pytestmark = [needs_chromium, pytest.mark.long]
 # Whether walls and part are to be seen, and the way from what is looked at to the eye.
 SEEN = """async () => {
   const { view } = await import("/browser/scene.js");
