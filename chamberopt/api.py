@@ -115,7 +115,7 @@ def propose(
     """
     from chamberopt.chamber.propose import first_design
     from chamberopt.chamber.propose.proposal import Wanted
-    from chamberopt.chamber.propose.shop import load_shop
+    from chamberopt.chamber.shop import load_shop
     from chamberopt.common.files import claim_folder
     from chamberopt.common.progress import no_steps
     from chamberopt.geometry.meshes.units import STATED

@@ -18,8 +18,8 @@ ORDER = {
         "common geometry design chamber coverage simulation peening search results pictures "
         "documents printers viewer workflows export page api cli __main__"
     ),
-    "chamberopt/geometry": "triangles faces+heights+outline+solids+remesh+sight+thickness meshes "
-    "slivers+smoothing cut",
+    "chamberopt/geometry": "triangles faces+heights+outline+solids+remesh+sight+thickness "
+    "face_shapes meshes slivers+smoothing cut",
     "chamberopt/geometry/smoothing": "rounds normals divide smooth part",
     "chamberopt/geometry/meshes": "surface_error native_reader+units+raw_mesh+self_intersection "
     "healing+elements+step_tessellation abaqus+gmsh+nastran+obj+ply+step+stl+threemf+vtk formats "
@@ -31,7 +31,7 @@ ORDER = {
     "chamberopt/chamber": (
         "replica_seed bores_and_deflectors thin_part part fixture+reach+largest_ball build "
         "dimensionless "
-        "flexure+scene analytic checks propose"
+        "flexure+scene analytic shop checks propose"
     ),
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
     "true_densities percentile coverage_intervals strength strength_intervals stress_law "

@@ -37,6 +37,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import typeset_plain
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, lofted
 from chamberopt.geometry.cut import piece_beyond
+from chamberopt.geometry.face_shapes import is_hole
 from chamberopt.geometry.meshes.self_intersection import crossing_pairs
 from chamberopt.geometry.meshes.surface_error import format_point
 from chamberopt.geometry.outline import (
@@ -534,14 +535,6 @@ def pieces_of(triangles: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:
     number = np.cumsum(chosen) - 1
     piece = connected_pieces(number[one[inside]], number[two[inside]], len(rows))[1]
     return [rows[piece == k] for k in range(piece.max() + 1)] if len(rows) else []
-
-
-def is_hole(vertices: np.ndarray, triangles: np.ndarray) -> bool:
-    """Return whether faces of a part look towards their own middle, as the wall of a hole does."""
-    vectors, middles = area_vectors(vertices, triangles), vertices[triangles].mean(axis=1)
-    weight = np.linalg.norm(vectors, axis=1)
-    inward = np.average(middles, axis=0, weights=weight) - middles
-    return bool((inward * vectors).sum() > 0.0)
 
 
 def _offsets(vertices: np.ndarray, triangles: np.ndarray, thickness: float) -> np.ndarray:

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 # simulation differs from the machine, in words for a workshop.
 
 TIME = "time_to_98_s"
-WIDEST_FACE = 90.0  # mm: larger faces need slots or are several (chamber/propose/usual_shop.toml)
+WIDEST_FACE = 90.0  # mm: larger faces need slots or are several (chamber/usual_shop.toml)
 SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wall is named by it
 EDGE, CLAMPED = 5e-5, 3e-3  # m: narrower openings are none; jaws take what stands out so far
 JAMMED = 0.01  # least share of the shot's time, or of the impacts, in gaps that is told in red

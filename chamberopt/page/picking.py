@@ -8,7 +8,7 @@ import numpy as np
 
 from chamberopt.chamber.part import PartPreview, chosen_triangles, preview_part
 from chamberopt.chamber.propose.pose import square_to_walls, turns_down
-from chamberopt.chamber.propose.proposed_target import SHAPES, propose_sizes
+from chamberopt.chamber.propose.proposed_sizes import SHAPES, propose_sizes
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.design.part import MAX_FACES, FaceAt, Selection

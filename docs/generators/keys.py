@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from chamberopt.chamber.propose.shop import Shop
+from chamberopt.chamber.shop import Shop
 from chamberopt.common.toml_errors import accepted_values, table_of
 from chamberopt.design.calibration import Calibration
 from chamberopt.design.design import AnyShape, Design

@@ -17,8 +17,6 @@ from chamberopt.chamber.checks.place_names import PART_SIDES, SIDE_WALL
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.propose.held_proposal import (
-    clamped_outside,
-    grips_poorly,
     hangs_by_a_face,
     held,
     is_firm,
@@ -57,6 +55,7 @@ from chamberopt.chamber.propose.proposed_arbor import (
     turning_pose,
 )
 from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball, sizes_to_try
+from chamberopt.chamber.propose.proposed_clamp import clamped_outside, grips_poorly
 from chamberopt.chamber.propose.proposed_end import (
     HeldEnd,
     Shape,
@@ -77,16 +76,9 @@ from chamberopt.chamber.propose.proposed_floor import (
     of_blocks,
     require_room,
 )
-from chamberopt.chamber.propose.proposed_target import (
-    Surface,
-    Target,
-    middle_in_plan,
-    propose_sizes,
-    propose_target,
-    shape_for,
-    surfaces,
-)
-from chamberopt.chamber.propose.shop import HARD, STEEL, Shop, usual_shop
+from chamberopt.chamber.propose.proposed_sizes import middle_in_plan, propose_sizes, shape_for
+from chamberopt.chamber.propose.proposed_target import Surface, Target, propose_target, surfaces
+from chamberopt.chamber.shop import HARD, STEEL, Shop, usual_shop
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import step
 from chamberopt.common.toml_fields import MAX_COORDINATE_MM

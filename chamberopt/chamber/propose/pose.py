@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from chamberopt.chamber.propose.proposed_target import LONG
+from chamberopt.chamber.propose.proposed_sizes import LONG
 from chamberopt.geometry.triangles import area_vectors, rotation_matrix, unit_vectors
 
 if TYPE_CHECKING:

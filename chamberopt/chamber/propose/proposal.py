@@ -16,9 +16,10 @@ from chamberopt.chamber.propose.pose import Pose
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS, SizeFit, charge_of
 from chamberopt.chamber.propose.proposed_end import Strips
 from chamberopt.chamber.propose.proposed_floor import Floor
-from chamberopt.chamber.propose.proposed_target import Sizes, Surface
-from chamberopt.chamber.propose.shop import Shop, ShopSonotrode
+from chamberopt.chamber.propose.proposed_sizes import Sizes
+from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.chamber.scene import MAX_BALLS
+from chamberopt.chamber.shop import Shop, ShopSonotrode
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_fields import allowed_range
 from chamberopt.design.design import Design, validate
@@ -109,6 +110,7 @@ class Proposal:
     jams: tuple[JamGap, ...]  # gaps of chamber and part in which the balls jam
     sonotrode: ShopSonotrode  # whose face carries the chamber
     strips: Strips | None = None  # of which the target is one
+    closed: tuple[str, ...] = ()  # sides at which a face of the part is the wall, such as "-x"
     # Of all replicas of a candidate [s], to know the time in which its target is covered; None if
     # no pilot ran, or balls do not touch enough of the target.
     search_time: float | None = None
@@ -180,6 +182,7 @@ def checked(
         jams=tuple(jam_gaps(chamber, diameter, gaps_in_reach(shot_reach(design, chamber)))),
         sonotrode=floor.stand.sonotrode,
         strips=floor.strips,
+        closed=sizes.closed,
     )
 
 
@@ -387,3 +390,11 @@ def nested(tables: Tables) -> dict[str, object]:
             table = table.setdefault(key, {})
         table.update(values)
     return nested
+
+
+def with_table(tables: Tables, after: str, name: str, values: dict[str, Any]) -> Tables:
+    """Return tables with one more after that of some name."""
+    added: Tables = {}
+    for key, one in tables.items():
+        added |= {key: one, name: values} if key == after else {key: one}
+    return added

@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.fixture import ACROSS, is_hole
+from chamberopt.chamber.fixture import ACROSS
 from chamberopt.chamber.propose.pose import Turns, square_to_walls, turns_down
 from chamberopt.chamber.propose.proposed_target import CREASE_DEG
 from chamberopt.common.number_text import plain
+from chamberopt.geometry.face_shapes import is_hole
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import (
     convex_hull,

@@ -24,7 +24,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.propose.pose import Turns, turns_down
-from chamberopt.chamber.propose.proposed_target import Sizes, Target
+from chamberopt.chamber.propose.proposed_sizes import Sizes
+from chamberopt.chamber.propose.proposed_target import Target
 from chamberopt.design.shapes.outlines import area_inside
 from chamberopt.geometry.cut import cut_at_box, facets
 from chamberopt.geometry.heights import lowest_over

@@ -24,8 +24,8 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.chamber.propose.proposed_end import Strips
-from chamberopt.chamber.propose.proposed_target import Sizes
-from chamberopt.chamber.propose.shop import Shop, Stand
+from chamberopt.chamber.propose.proposed_sizes import Sizes
+from chamberopt.chamber.shop import Shop, Stand
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.design.fixture import WIDEST_GAP

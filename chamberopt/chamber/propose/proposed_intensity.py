@@ -35,7 +35,7 @@ from chamberopt.chamber.propose.proposed_setting import (
     settings_of,
     with_amplitude,
 )
-from chamberopt.chamber.propose.shop import usual_shop
+from chamberopt.chamber.shop import usual_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.design.almen_strip import OVER_A

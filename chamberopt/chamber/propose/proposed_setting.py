@@ -29,7 +29,7 @@ from chamberopt.chamber.propose.proposed_balls import (
     serving_sizes,
     sizes_to_try,
 )
-from chamberopt.chamber.propose.shop import ShopSonotrode, usual_shop
+from chamberopt.chamber.shop import ShopSonotrode, usual_shop
 from chamberopt.design.intensity import WantedIntensity
 
 BALL_POWER, AMPLITUDE_POWER = 1.0, 0.9

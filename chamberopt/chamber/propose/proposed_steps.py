@@ -17,7 +17,6 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import shot_reach
 from chamberopt.chamber.checks.jams import gaps_in_reach, jam_gaps
 from chamberopt.chamber.checks.warning import WarningKind
-from chamberopt.chamber.propose.held_proposal import bore_clearance_mm
 from chamberopt.chamber.propose.proposal import (
     Proposal,
     faults,
@@ -46,6 +45,7 @@ from chamberopt.chamber.propose.proposed_budget import (
     measured_budget,
     with_budget,
 )
+from chamberopt.chamber.propose.proposed_clamp import bore_clearance_mm
 from chamberopt.chamber.propose.proposed_floor import of_blocks
 from chamberopt.chamber.propose.proposed_intensity import LARGER
 from chamberopt.chamber.propose.proposed_mask import moved_openings

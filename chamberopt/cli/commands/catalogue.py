@@ -79,7 +79,7 @@ def shop(file: Path | None = None, /, *, example: bool = False) -> None:
     example
         Print an annotated file with usual sizes, to start from.
     """
-    from chamberopt.chamber.propose.shop import example_text, load_shop
+    from chamberopt.chamber.shop import example_text, load_shop
     from chamberopt.common.errors import InputError
 
     if example == (file is not None):

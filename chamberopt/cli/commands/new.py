@@ -89,7 +89,7 @@ def new(
     from chamberopt.chamber.propose.first_design import propose
     from chamberopt.chamber.propose.proposal import Wanted
     from chamberopt.chamber.propose.proposed_mask import find_left_out
-    from chamberopt.chamber.propose.shop import load_shop
+    from chamberopt.chamber.shop import load_shop
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.errors import InputError
     from chamberopt.common.files import claim_folder

@@ -16,9 +16,10 @@ from chamberopt.chamber.propose.first_design import _shot, propose
 from chamberopt.chamber.propose.pose import pose_in_words
 from chamberopt.chamber.propose.proposal import Wanted, propose_charge, propose_ranges
 from chamberopt.chamber.propose.proposed_mask import find_left_out
-from chamberopt.chamber.propose.proposed_target import Sizes, Surface, propose_target, surfaces
-from chamberopt.chamber.propose.shop import StockBalls, usual_shop
+from chamberopt.chamber.propose.proposed_sizes import Sizes
+from chamberopt.chamber.propose.proposed_target import Surface, propose_target, surfaces
 from chamberopt.chamber.propose.text import design_text
+from chamberopt.chamber.shop import StockBalls, usual_shop
 from chamberopt.common.errors import InputError
 from chamberopt.design.part import Target
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part

@@ -26,7 +26,8 @@ from chamberopt.chamber.propose.proposed_end import (
     strip,
 )
 from chamberopt.chamber.propose.proposed_mask import rows_of, unlike_settings
-from chamberopt.chamber.propose.proposed_target import Surface, Target, propose_sizes
+from chamberopt.chamber.propose.proposed_sizes import propose_sizes
+from chamberopt.chamber.propose.proposed_target import Surface, Target
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.triangles import areas

@@ -36,8 +36,8 @@ from chamberopt.chamber.propose.proposed_setting import (
     setting_of,
     settings_of,
 )
-from chamberopt.chamber.propose.shop import Shop, load_shop
 from chamberopt.chamber.propose.text import design_text, study_texts
+from chamberopt.chamber.shop import Shop, load_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.design.design import validate

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from manifold3d import CrossSection, Manifold
 
+from chamberopt.chamber.propose.proposed_sizes import Sizes, propose_sizes
 from chamberopt.chamber.propose.proposed_target import (
     BY_SHAPE,
     BY_SIZE,
     CREASE_DEG,
-    Sizes,
     crease_deg,
-    propose_sizes,
     propose_target,
     surfaces,
 )

@@ -13,8 +13,8 @@ from chamberopt.chamber.propose.proposed_floor import (
     floor_on_sonotrode,
     require_room,
 )
-from chamberopt.chamber.propose.proposed_target import Sizes
-from chamberopt.chamber.propose.shop import Shop, example_text, load_shop, usual_shop
+from chamberopt.chamber.propose.proposed_sizes import Sizes
+from chamberopt.chamber.shop import Shop, example_text, load_shop, usual_shop
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 

@@ -1,0 +1,229 @@
+"""Clamp a proposed part where it stands out of its chamber, through a bore in the wall."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from chamberopt.chamber.checks.place_names import CEILING, surface_names
+from chamberopt.chamber.propose.proposal import Proposal, checked, with_table
+from chamberopt.chamber.propose.proposed_end import DEEP
+from chamberopt.chamber.propose.proposed_floor import Floor
+from chamberopt.chamber.propose.proposed_mask import FLAT_DEG, rows_of
+from chamberopt.chamber.propose.proposed_target import (
+    apart,
+    area_in_mm2,
+    named_or_all,
+    nearest_axis,
+)
+from chamberopt.chamber.shop import Shop
+from chamberopt.design.fixture import WIDEST_GAP, tight_gap_mm
+from chamberopt.geometry.faces import Faces
+from chamberopt.geometry.outline import convex_hull, fitted_circle, frame_along, narrowest_rectangle
+from chamberopt.geometry.triangles import unit_normals
+
+MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
+ROUNDING = 1e-9  # of a clearance over its step
+SEEN_OUT = 1e-3  # m by which a part stands out of a side
+MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area over the largest
+# Flat faces looked at for jaws; least area of each [m²]; of two, share of all that stands out, and
+# how far apart they are over the part's size: no vice takes a shaft by its ends.
+MOST_FLAT, LEAST_JAW, LEAST_OF_ALL, JAWS_OPEN = 20, 30e-6, 0.15, 0.8
+# Of a round face: how far its corners may be off a circle, over its radius, and the sum of its area
+# vectors over its area.
+OFF_ROUND, ALL_WAYS = 0.02, 0.2
+
+
+class Clamp(NamedTuple):
+    """What a part is clamped by outside of its chamber."""
+
+    text: str  # empty if nothing is named
+    is_shallow: bool = False  # true if jaws reach less deep than they need
+
+
+def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
+    """Return a proposal whose part, which goes out of the chamber, is held where it does."""
+    keys = {"kind": "bore", "clearance_mm": bore_clearance_mm(made.design.shot.diameter)}
+    tables = with_table(made.tables, "sonotrode", "holder", keys)
+    by = f" by {clamp.text}" if (clamp := _clamp(made)).text else ""
+    text = (
+        f"clamped where it stands out of the chamber at {', '.join(_sides_out(made))}{by}; the "
+        f"wall, cut out {keys['clearance_mm']:g} mm round it so that no ball passes, is split there"
+    )
+    if _is_cut_all_round(made):
+        text += (
+            "; CUT ON SEVERAL SIDES: the part goes out through walls that do not lie opposite, so "
+            "that its openings are long and the room is narrow: give the whole part a room (by a "
+            "larger sonotrode, or --pose standing), or take another target"
+        )
+    reasons = {**made.reasons, "holder.kind": text}
+    return checked(tables, reasons, floor, made.known, made.mesh, shop)
+
+
+def grips_poorly(made: Proposal) -> bool:
+    """Return whether a part that goes out of its chamber is cut all round, or held by a rim.
+
+    So is one whose holder grips little of an end.
+    """
+    holder = made.design.holder
+    if holder is None:
+        return False
+    if holder.kind == "bore":
+        return _is_cut_all_round(made) or _clamp(made).is_shallow
+    return holder.grip_mm is not None and holder.grip_mm < 1e3 * DEEP
+
+
+def _is_cut_all_round(made: Proposal) -> bool:
+    """Return whether a part goes out through side walls of which none lies opposite.
+
+    A wall that a face of the part closes does not count: a plate is cut out round it anyway. Nor is
+    a part cut that lies on the walls as a lid.
+    """
+    if "z" in made.closed or not (surface_names(made.chamber) == CEILING).any():
+        return False
+    closed = {f"+{one}".replace("+-", "-") for one in made.closed}
+    through = {side[-1] for side in _sides_out(made) if side not in closed}
+    return {"x", "y"} <= through
+
+
+def bore_clearance_mm(ball: float) -> float:
+    """Return the clearance of a bore [mm] in which no ball of a diameter [m] wedges.
+
+    It is no wider than a sheet allows of joints. As the part may lie against one side of its bore,
+    it is a quarter of a ball at most, which is less for the finest balls alone.
+    """
+    most = min(tight_gap_mm(1e3 * ball), 500.0 * WIDEST_GAP * ball)
+    return min(MILLED_MM, math.floor(20.0 * most + ROUNDING) / 20.0)
+
+
+def _clamp(made: Proposal) -> Clamp:
+    """Return what a part that stands out of its chamber is clamped by there.
+
+    It is two flat faces that jaws reach far over, or else surfaces by name, round ones first.
+    """
+    chamber, part = made.chamber, made.chamber.part
+    low, high = (end(chamber.vertices, axis=0) for end in (np.min, np.max))
+    # What is buried in another body of the part, or under a mask, is not outside.
+    corners = part.vertices[part.triangles]
+    is_beyond = ((corners < low) | (corners > high)).any(axis=(1, 2))
+    outside = np.where(is_beyond & ~part.target, part.area - chamber.exposed_area, 0.0)
+    jaws = _flat_jaws(part.vertices, part.triangles, outside)
+    if jaws.text and not jaws.is_shallow:
+        return jaws
+    known = [
+        (one, np.where(rows_of(made.design, one.keys), outside, 0.0))
+        for one in named_or_all(made.known)
+    ]
+    # One round face is held better than many flanks, such as those of splines.
+    axes = {"xyz".index(side[-1]) for side in _sides_out(made)}
+    rounds = [
+        (one, each)
+        for one, each in known
+        if not any("alike" in face for face in one.keys.get("faces", ()))
+        and any(_is_round(corners, each, k) for k in axes)
+    ]
+    used = rounds or ([] if jaws.text else known)
+    areas = apart([(one, float(each.sum()), each) for one, each in used if each.any()])
+    most = [(one, area) for one, area in areas if area > JAW_SHARE * areas[0][1]]
+    if not most:
+        return jaws
+    named = (f"{one.name} ({area_in_mm2(area)} of it)" for one, area in most[:MOST_JAWS])
+    return Clamp(", ".join(named))
+
+
+def _sides_out(made: Proposal) -> list[str]:
+    """Return the sides at which a part stands out of its chamber, such as "+x", sorted."""
+    chamber, part = made.chamber, made.chamber.part
+    low, high = (end(chamber.vertices, axis=0) for end in (np.min, np.max))
+    beyond = high - part.vertices.max(axis=0), part.vertices.min(axis=0) - low
+    signs = zip(("+", "-"), beyond, strict=True)
+    return sorted(
+        f"{sign}{'xyz'[k]}" for sign, room in signs for k in range(3) if room[k] < -SEEN_OUT
+    )
+
+
+def _is_round(corners: np.ndarray, outside: np.ndarray, axis: int) -> bool:
+    """Return whether what stands out of a surface is a round about an axis that a clamp holds.
+
+    All of it is as far from the axis, it goes all round, it is no bore, and it is long enough.
+
+    Args:
+        corners: of all triangles of the part [m], (m, 3, 3).
+        outside: area of each that belongs to the surface and may be clamped [m²], (m,).
+        axis: number of the axis.
+    """
+    own = outside > 0.0
+    if not own.any():
+        return False
+    across = np.delete(corners[own], axis, axis=2).reshape(-1, 2)
+    middle, radius = fitted_circle(across)
+    off = np.abs(np.linalg.norm(across - middle, axis=1) - radius).max()
+    normal, area = np.delete(unit_normals(corners[own]), axis, axis=1), outside[own]
+    is_even = np.linalg.norm(area @ normal) < ALL_WAYS * area.sum()
+    aside = np.delete(corners[own].mean(axis=1), axis, axis=1) - middle
+    is_outer = float(area @ (normal * aside).sum(axis=1)) > 0.0
+    is_long = float(np.ptp(corners[own][..., axis])) >= DEEP
+    return bool(off < OFF_ROUND * radius and is_even and is_outer and is_long)
+
+
+def _flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) -> Clamp:
+    """Return the largest two flat faces, back to back, that stand out of a chamber.
+
+    The text is empty where there are none as large as jaws take.
+
+    Args:
+        vertices, triangles: the posed part [m].
+        outside: area of each triangle that may be clamped [m²], (m,).
+    """
+    faces = Faces(vertices, triangles, FLAT_DEG)
+    free = np.where(
+        faces.are_flat(FLAT_DEG), np.bincount(faces.of_triangle, outside, faces.count), 0.0
+    )
+    largest = np.argsort(-free, kind="stable")[:MOST_FLAT]
+    best, found = (False, LEAST_JAW), Clamp("")
+    longest = float(np.ptp(vertices, axis=0).max())
+    for k, one in enumerate(largest):
+        for other in largest[k + 1 :]:
+            pair = [int(one), int(other)]
+            area = float(min(free[one], free[other]))
+            ways = faces.normal(int(one)), faces.normal(int(other))
+            is_little = free[one] + free[other] < LEAST_OF_ALL * outside.sum()
+            is_small = is_little or area <= LEAST_JAW
+            if is_small or ways[0] @ ways[1] > -np.cos(np.radians(FLAT_DEG)):
+                continue
+            places = faces.place(int(one)), faces.place(int(other))
+            apart_by = ways[0] @ (places[0] - places[1])
+            if not 0.0 < apart_by < JAWS_OPEN * longest:  # the sides of a slot, or its far ends
+                continue
+            out = [vertices[triangles[(faces.of_triangle == k) & (outside > 0.0)]] for k in pair]
+            depth = min(_depth(*each) for each in zip(out, ways, free[pair], strict=True))
+            is_shallow = depth < DEEP
+            if (not is_shallow, area) <= best:
+                continue
+            best = not is_shallow, area
+            text = "jaws on its flat faces that look to " + " and ".join(
+                f"{nearest_axis(way)} ({area_in_mm2(float(free[face]))} of it)"
+                for way, face in zip(ways, pair, strict=True)
+            )
+            if is_shallow:
+                text += f"; SHALLOW GRIP, {1e3 * depth:.2g} mm of these faces: jaws need "
+                text += f"{1e3 * DEEP:g} mm"
+            found = Clamp(text, is_shallow)
+    return found
+
+
+def _depth(corners: np.ndarray, way: np.ndarray, area: float) -> float:
+    """Return how deep jaws reach over a piece of a flat face on the average [m].
+
+    Args:
+        corners: of its triangles, (k, 3, 3) [m].
+        way: normal of the face, (3,).
+        area: of the piece [m²].
+    """
+    hull = convex_hull(corners.reshape(-1, 3) @ frame_along(way)[:2].T)
+    if hull is None:
+        return 0.0
+    long, short = narrowest_rectangle(hull)[1]
+    return float(min(short, area / long))

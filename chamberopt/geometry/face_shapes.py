@@ -1,0 +1,138 @@
+"""Tell the shapes of a surface's faces: holes, tubes, teeth, rings of faces, fillets."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from chamberopt.geometry.faces import Faces
+from chamberopt.geometry.triangles import area_vectors, areas, side_pairs, unit_vectors
+
+PATTERN = 6  # number of alike faces, or of teeth, that make a repeated feature
+ALL_ROUND = 0.2  # sum of a face's area vectors over its area, below which it goes all round
+FLAT = 0.95  # the same, above which a face is flat
+# Faces stand round an axis where the variances of their middles along both axes of their plane
+# differ by less than this share.
+RING = 0.1
+# A face may go on from tooth to tooth: the mean radius over the angle round its axis then swings by
+# so much of itself or more, and repeats: this share of its variance is that of one harmonic and of
+# its multiples.
+SWING, PERIODIC, ANGLES = 0.02, 0.8, 720
+# A fillet is a hollow face of a CAD file that goes on smoothly at this share of its border or more,
+# up to this angle. Its radius is less than this share of the part's size.
+SMOOTH_BORDER, SMOOTH_DEG, WIDE_FILLET = 0.5, 10.0, 0.2
+
+
+def is_hole(vertices: np.ndarray, triangles: np.ndarray) -> bool:
+    """Return whether faces of a part look towards their own middle, as the wall of a hole does."""
+    vectors, middles = area_vectors(vertices, triangles), vertices[triangles].mean(axis=1)
+    weight = np.linalg.norm(vectors, axis=1)
+    inward = np.average(middles, axis=0, weights=weight) - middles
+    return bool((inward * vectors).sum() > 0.0)
+
+
+def is_inside_of_tube(vertices: np.ndarray, triangles: np.ndarray) -> bool:
+    """Return whether a face is the inside of a tube, which looks at itself all round."""
+    vectors = area_vectors(vertices, triangles)
+    size = float(np.linalg.norm(vectors, axis=1).sum())
+    is_round = np.linalg.norm(vectors.sum(axis=0)) < ALL_ROUND * size
+    return bool(is_round and is_hole(vertices, triangles))
+
+
+def is_ring(faces: Faces, vertices: np.ndarray, triangles: np.ndarray, own: np.ndarray) -> bool:
+    """Return whether faces stand evenly round an axis.
+
+    Args:
+        faces: of the surface.
+        vertices, triangles: of the surface [m], (n, 3) and (m, 3).
+        own: marks the triangles of those faces that are asked for, (m,) bool.
+    """
+    weight = areas(vertices, triangles[own])
+    middle = vertices[triangles[own]].mean(axis=1)
+    numbers, row = np.unique(faces.of_triangle[own], return_inverse=True)
+    whole = np.bincount(row, weight)
+    places = np.stack([np.bincount(row, weight * x) / whole for x in middle.T], axis=1)
+    _, wide, widest = np.linalg.eigvalsh(np.cov(places.T, bias=True))
+    return len(numbers) > 2 and bool(widest - wide < RING * widest)
+
+
+def teeth_of(vertices: np.ndarray, triangles: np.ndarray) -> int:
+    """Return how often a face repeats round its axis, such as one of all teeth; 0 if it does not.
+
+    Its axis goes through its middle, across the plane in which it spreads alike. A flat face, such
+    as the end of a gear, has no teeth. Fewer than PATTERN are not told from a round face.
+    """
+    vectors, weight = area_vectors(vertices, triangles), areas(vertices, triangles)
+    if np.linalg.norm(vectors.sum(axis=0)) > FLAT * np.linalg.norm(vectors, axis=1).sum():
+        return 0
+    middles = vertices[triangles].mean(axis=1)
+    middles = middles - np.average(middles, axis=0, weights=weight)
+    spread, axes = np.linalg.eigh(np.cov(middles.T, aweights=weight, bias=True))
+    odd = 0 if spread[2] - spread[1] < spread[1] - spread[0] else 2
+    x, y = (middles @ axes.T[k] for k in range(3) if k != odd)
+    angle, radius = np.arctan2(y, x), np.hypot(x, y)
+    own = np.floor((angle / (2.0 * np.pi) + 0.5) * ANGLES).astype(int) % ANGLES
+    sums = np.bincount(own, weight, ANGLES), np.bincount(own, weight * radius, ANGLES)
+    known = np.flatnonzero(sums[0])
+    profile = sums[1][known] / sums[0][known]
+    profile = np.interp(np.arange(ANGLES), known, profile, period=ANGLES)
+    power = np.abs(np.fft.rfft(profile)[1:]) ** 2
+    count = PATTERN + int(power[PATTERN - 1 :].argmax())
+    if profile.std() < SWING * profile.mean() or not power.any():
+        return 0
+    share = power[count - 1 :: count].sum() / power.sum()
+    return count if share >= PERIODIC else 0
+
+
+def find_fillets(
+    faces: Faces, vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers of the faces that are fillets, and the curvature of each [1/m], both (k,).
+
+    Args:
+        faces: of the surface, as its CAD file has them.
+        vertices, triangles: of the surface [m], (n, 3) and (m, 3).
+        normals: at the corners of each triangle, (m, 3, 3).
+    """
+    hollow = hollow_curvature(vertices, triangles, normals)
+    corner = np.arange(triangles.size).reshape(-1, 3)
+    after = np.roll(corner, -1, axis=1).reshape(-1)  # of each corner, the next one of its triangle
+    one, two = side_pairs(triangles).T  # a side begins at its corner, the other one ends there
+    of, beyond = faces.of_triangle[one // 3], faces.of_triangle[two // 3]
+    places, flat_normals = vertices[triangles].reshape(-1, 3), normals.reshape(-1, 3)
+    long = np.linalg.norm(places[one] - places[after[one]], axis=1) * (of != beyond)
+    turn = np.einsum("ij,ij->i", flat_normals[one], flat_normals[after[two]])
+    smooth = long * (turn > math.cos(math.radians(SMOOTH_DEG)))
+    border, goes_on = (
+        np.bincount(of, x, faces.count) + np.bincount(beyond, x, faces.count)
+        for x in (long, smooth)
+    )
+    least = 1.0 / (WIDE_FILLET * float(np.linalg.norm(np.ptp(vertices, axis=0))))
+    bent = np.array([np.median(hollow[faces.of_triangle == k]) for k in range(faces.count)])
+    found = np.flatnonzero((bent > least) & (goes_on >= SMOOTH_BORDER * border) & (border > 0.0))
+    return found, bent[found]
+
+
+def hollow_curvature(
+    vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray
+) -> np.ndarray:
+    """Return the largest hollow curvature of each triangle [1/m], (m,), from its stated normals.
+
+    The curvatures along the three sides make up its second fundamental form: S. Rusinkiewicz,
+    "Estimating Curvatures and Their Derivatives on Triangle Meshes" (2004).
+
+    Args:
+        vertices, triangles: [m], (n, 3) and (m, 3).
+        normals: at the corners of each triangle, (m, 3, 3).
+    """
+    corners = vertices[triangles]
+    step, bend = (np.roll(x, -1, axis=1) - x for x in (corners, normals))
+    along = unit_vectors(step[:, 0])
+    across = np.cross(unit_vectors(area_vectors(vertices, triangles)), along)
+    square = np.maximum(np.einsum("mki,mki->mk", step, step), 1e-30)
+    u, v = (np.einsum("mki,mi->mk", step, axis) for axis in (along, across))
+    form = np.stack([u * u, 2.0 * u * v, v * v], axis=2) / square[..., None]
+    value = np.einsum("mki,mki->mk", bend, step) / square
+    p, q, r = np.einsum("mij,mj->mi", np.linalg.pinv(form), value).T
+    return np.asarray(np.hypot(0.5 * (p - r), q) - 0.5 * (p + r))
