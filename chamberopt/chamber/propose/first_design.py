@@ -43,7 +43,6 @@ from chamberopt.chamber.propose.proposal import (
     Wanted,
     checked,
     faults,
-    is_capped,
     nested,
     touched_share,
 )
@@ -380,10 +379,10 @@ def _proposed(
     spare: tuple[Proposal, Floor] | None = None  # a room of which the part is held badly
     with step("building and checking the chamber") as progress:
         made, floor = built(is_local=goes_out)
-        if not goes_out and (not floor.is_one_sonotrode or is_capped(made)):
+        if not goes_out and (not floor.is_one_sonotrode or made.is_capped):
             with suppress(InputError):
                 local, its_floor = built(is_local=True)
-                if its_floor.is_one_sonotrode and not is_capped(local):
+                if its_floor.is_one_sonotrode and not local.is_capped:
                     if not local.chamber.pieces_in_air:
                         local = clamped_outside(local, its_floor, wanted.shop)
                         local = padded(local, its_floor, target, wanted.shop)

@@ -38,7 +38,6 @@ FEW_MM = 400.0  # longest range with fine steps: a study takes at most 999 steps
 LARGEST_MM = allowed_range(ParametricChamber.model_fields["height_mm"])[1]  # side of a chamber
 HEAVIEST_G = allowed_range(ShotTable.model_fields["mass_g"])[1]
 REPLICAS = 10  # the fewest that a wanted half-width takes
-CAPPED = "less than half a layer of balls"
 # Lengths that are set up. In plan the wall follows the sonotrode's face, with less clearance.
 LENGTHS = ("height_mm", "sonotrode_distance_mm")
 PEAK_TO_VALLEY_UM = USUAL["amplitude_pv_um"]
@@ -110,6 +109,8 @@ class Proposal:
     jams: tuple[JamGap, ...]  # gaps of chamber and part in which the balls jam
     sonotrode: ShopSonotrode  # whose face carries the chamber
     strips: Strips | None = None  # of which the target is one
+    # True if its chamber holds fewer balls than it should, as more take too long.
+    is_capped: bool = False
     closed: tuple[str, ...] = ()  # sides at which a face of the part is the wall, such as "-x"
     # Of all replicas of a candidate [s], to know the time in which its target is covered; None if
     # no pilot ran, or balls do not touch enough of the target.
@@ -161,11 +162,12 @@ def checked(
     design = validate(Design, nested(tables))
     chamber = build_chamber(design)
     diameter, ball_mass = design.shot.diameter, design.shot.ball_mass
-    mass_g, reason = propose_charge(sonotrode_area(chamber), diameter, ball_mass)
+    charge = propose_charge(sonotrode_area(chamber), diameter, ball_mass)
+    mass_g = charge.mass_g
     tables = {**tables, "shot": {**tables["shot"], "mass_g": mass_g}}
     tables["tolerances"] = propose_tolerances(tables)
     design = validate(Design, nested(tables))
-    reasons = {**reasons, "shot.mass_g": f"{reason}: {design.shot.count}", "tolerances": OF_LENGTHS}
+    in_words = {"shot.mass_g": f"{charge.reason}: {design.shot.count}", "tolerances": OF_LENGTHS}
     found = tuple(warnings(design, chamber))
     if math.isinf(floor.lean):
         found = (DesignWarning(WarningKind.WIDE_FLOOR, f"chamber: {floor.reason}"), *found)
@@ -173,7 +175,7 @@ def checked(
     return Proposal(
         design=design,
         tables=tables,
-        reasons=reasons,
+        reasons={**reasons, **in_words},
         bounds=holding(_in_shop({k: one._asdict() for k, one in ranges.items()}, shop), design),
         known=tuple(known),
         mesh=mesh,
@@ -183,6 +185,7 @@ def checked(
         sonotrode=floor.stand.sonotrode,
         strips=floor.strips,
         closed=sizes.closed,
+        is_capped=charge.is_capped,
     )
 
 
@@ -213,11 +216,6 @@ def warned_again(made: Proposal, design: Design, chamber: Chamber) -> tuple[Desi
     """
     of_floor = (one for one in made.warnings if one.kind == WarningKind.WIDE_FLOOR)
     return (*of_floor, *warnings(design, chamber))
-
-
-def is_capped(made: Proposal) -> bool:
-    """Return whether a chamber holds fewer balls than it should, as more take too long."""
-    return made.reasons["shot.mass_g"].startswith(CAPPED)
 
 
 def faults(made: Proposal) -> tuple[int, int]:
@@ -273,8 +271,16 @@ class Range(NamedTuple):
     step: float
 
 
-def propose_charge(floor: float, diameter: float, ball_mass: float) -> tuple[float, str]:
-    """Return the mass of all balls together [g], to two digits, and the reason for it.
+class Charge(NamedTuple):
+    """The proposed mass of all balls together."""
+
+    mass_g: float  # to two digits
+    reason: str
+    is_capped: bool = False  # true if it is less than it should be, as more take too long
+
+
+def propose_charge(floor: float, diameter: float, ball_mass: float) -> Charge:
+    """Return the proposed charge of a chamber.
 
     Args:
         floor: area of the sonotrode [m²].
@@ -284,11 +290,12 @@ def propose_charge(floor: float, diameter: float, ball_mass: float) -> tuple[flo
     count = max(1, min(full, MOST_BALLS))
     wanted, most = 1e3 * count * ball_mass, _heaviest_g(ball_mass)
     if wanted > most:
-        return most, "the most that is supported, less than half a layer of balls"
+        return Charge(most, "the most that is supported, less than half a layer of balls")
     mass = min(float(f"{wanted:.2g}"), most)
     if count < full:
-        return mass, f"{CAPPED}, as more take hours to simulate"
-    return mass, "half a layer of balls on the sonotrode"
+        text = "less than half a layer of balls, as more take hours to simulate"
+        return Charge(mass, text, is_capped=True)
+    return Charge(mass, "half a layer of balls on the sonotrode")
 
 
 def propose_ranges(

@@ -283,7 +283,7 @@ def _with_shot(made: Proposal, ball_mm: float) -> Proposal:
     Raises InputError if the chamber cannot be built with them.
     """
     ball_mass = made.design.shot.ball_mass * (ball_mm / setting_of(made).ball_mm) ** 3
-    mass_g, _ = propose_charge(sonotrode_area(made.chamber), 1e-3 * ball_mm, ball_mass)
+    mass_g = propose_charge(sonotrode_area(made.chamber), 1e-3 * ball_mm, ball_mass).mass_g
     mass_g = min(mass_g, float(f"{1e3 * MANY * ball_mass:.2g}"))
     shot = {"shot": {"diameter_mm": ball_mm, "mass_g": mass_g}}
     return _with_values(made, {**shot, **_clearance_for(made, ball_mm)}, _steps(made))
