@@ -15,12 +15,22 @@ if TYPE_CHECKING:
     from chamberopt.pictures.part3d import PartScene
 
 
+# Subjects of the sentences that qualify an answer, what changes the process most first.
+About: TypeAlias = Literal[
+    "process", "step", "zone", "best", "start", "other", "calibration", "ranges"
+]
+
+
 @dataclass(frozen=True)
 class Sentence:
-    """A paragraph. `kind` says how much the paragraph matters to the reader."""
+    """A paragraph. `kind` says how much the paragraph matters to the reader.
+
+    about: subject of a sentence that qualifies an answer; empty for any other.
+    """
 
     text: str
     kind: Literal["", "sentence", "warning", "soft"] = ""
+    about: About | Literal[""] = ""
 
 
 @dataclass(frozen=True)
@@ -110,10 +120,6 @@ class Fold:
     printed: bool = False
 
 
-# Subjects of the sentences that qualify an answer, what changes the process most first.
-About: TypeAlias = Literal[
-    "process", "step", "zone", "best", "start", "other", "calibration", "ranges"
-]
 Block: TypeAlias = Sentence | Items | Table | Chart | Tiles | TextFile | PartView | Beside | Fold
 
 
@@ -137,6 +143,10 @@ class AnswerLine:
     about: About
     text: str
     warns: bool
+
+    def sentence(self) -> Sentence:
+        """Return this line as a paragraph."""
+        return Sentence(self.text, "warning" if self.warns else "", self.about)
 
 
 @dataclass(frozen=True)

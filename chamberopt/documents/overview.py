@@ -84,10 +84,7 @@ def result_overview(result: Result) -> Section:
     start = load_start(result)
     content: list[Block] = [
         Sentence(answer(result, start), "sentence"),
-        *(
-            Sentence(one.text, "warning" if one.warns else "")
-            for one in answer_lines(result, start)
-        ),
+        *(one.sentence() for one in answer_lines(result, start)),
         figures_table(figures(result, start)),
         Sentence(limits_of_intervals(result), "soft"),
     ]

@@ -138,10 +138,7 @@ def answer_section(result: Result, start: Result | None) -> Section:
         "The answer",
         [
             Sentence(answer(result, start), "sentence"),
-            *(
-                Sentence(one.text, "warning" if one.warns else "")
-                for one in answer_lines(result, start)
-            ),
+            *(one.sentence() for one in answer_lines(result, start)),
             tiles(figures(result, start)),
             Sentence(limits_of_intervals(result), "soft"),
         ],

@@ -31,7 +31,7 @@ from chamberopt.common.toml_fields import read_toml
 from chamberopt.coverage.metrics import OBJECTIVES, metric_names, metric_problem
 from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
-from chamberopt.documents.answer import answer_lines, on_average
+from chamberopt.documents.answer import on_average
 from chamberopt.documents.comparison import after_shorter_time
 from chamberopt.documents.document import Section, Sentence
 from chamberopt.documents.overview import comparison_overview
@@ -160,7 +160,6 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
         InputError: a folder has no usable result, or the results cannot be compared.
     """
     longer: dict[str, object] = {}
-    above: set[str] = set()  # what the process does, beside the answer
     html, content = parts_content(folders)
     results = [*map(load_result, folders)]
     is_alike = len({one.design.process.treatment_time for one in results}) == 1
@@ -172,14 +171,12 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
         first = comparison_overview(compare(folders))
     else:
         (result,) = results
-        start = load_start(result)
-        first = answer_section(result, start)
-        above = {one.text for one in answer_lines(result, start) if one.about == "process"}
+        first = answer_section(result, load_start(result))
         if (times := times_longer(result)) > 1:
             now = result.design.process.accuracy.simulated_time_s
             longer = {"times": times, "values": {SIMULATED_TIME: float(f"{times * now:.4g}")}}
     sentences = [one for one in first.content if isinstance(one, Sentence)]
-    answers = [one for one in sentences if one.kind in ANSWERS or one.text in above]
+    answers = [one for one in sentences if one.kind in ANSWERS or one.about == "process"]
     figures = [one for one in first.content if one not in answers]
     html = explained(
         section(replace(first, content=answers), viewer)
