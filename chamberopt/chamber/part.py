@@ -348,7 +348,7 @@ def preview_part(design: Design) -> PartPreview:
         InputError: the file cannot be used, or target or zone are empty.
     """
     mesh, table = _part_of_file(design), design.part
-    target = _of_target(mesh, table.target)
+    target = of_target(mesh, table.target)
     zones = {
         one.name: _chosen(mesh, one.target, f"zones.{k}.target")
         for k, one in enumerate(design.zones)
@@ -408,7 +408,7 @@ def _chosen(mesh: PartMesh, wanted: Selection, field: str) -> np.ndarray:
     return chosen_triangles(mesh, wanted, field)
 
 
-def _of_target(mesh: PartMesh, target: Target) -> np.ndarray:
+def of_target(mesh: PartMesh, target: Target) -> np.ndarray:
     """Mark the triangles (m,) of a part's file that the target is, or a part of it.
 
     Of a triangle that is cut at the target's box, what is in the box belongs to the target.
@@ -455,7 +455,7 @@ def _simulated(
         mesh: the part as its file has it.
         is_wall: True if the part is a piece of the chamber's surface, which is not divided.
     """
-    chosen = _of_target(mesh, target)
+    chosen = of_target(mesh, target)
     rules = [
         (zone.smoothing or smoothing).rule(_chosen(mesh, zone.target, f"zones.{k}.target"))
         for k, zone in enumerate(zones)

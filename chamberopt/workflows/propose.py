@@ -14,6 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import new_harm
 from chamberopt.chamber.propose.proposed_budget import TooSlowError, measured_budget, with_budget
@@ -32,7 +33,7 @@ from chamberopt.chamber.propose.proposed_intensity import (
     with_thin_places,
     with_time,
 )
-from chamberopt.chamber.propose.proposed_mask import LeftOut, find_left_out
+from chamberopt.chamber.propose.proposed_mask import LeftOut, find_left_out, in_setting
 from chamberopt.chamber.propose.proposed_setting import Setting, setting_of, with_amplitude
 from chamberopt.chamber.propose.proposed_steps import (
     propose_second_pose,
@@ -122,11 +123,13 @@ class Proposed:
         made: the proposal.
         left_out: what may be left out of its target, or is peened beside it.
         studies: names of the study files.
+        settings: names of the design files of the part's other settings, if it has any.
     """
 
     made: Proposal
     left_out: Sequence[LeftOut]
     studies: Sequence[str]
+    settings: Sequence[str] = ()
 
 
 @contextmanager
@@ -208,7 +211,28 @@ def _written(first: Proposal, pilots: _Pilots, folder: Path) -> Proposed:
     studies = study_texts(made, DESIGN)
     for name, text in studies.items():
         write_text(folder / name, text)
-    return Proposed(made, left_out, list(studies))
+    settings = _settings_beside(made, folder, left_out)
+    for name, text in settings.items():
+        write_text(folder / name, text)
+    return Proposed(made, left_out, list(studies), list(settings))
+
+
+def _settings_beside(made: Proposal, folder: Path, left_out: Sequence[LeftOut]) -> dict[str, str]:
+    """Return the texts of the designs of a part's other settings, by file name.
+
+    A setting that needs a chamber of its own has none: what is to be settled tells why.
+    """
+    texts: dict[str, str] = {}
+    strips = made.strips
+    for number in range(strips.settings) if strips else ():
+        if strips and number != strips.chosen:
+            with suppress(InputError):
+                other = in_setting(made, strips, number)
+                build_chamber(other.design)
+                head = f"# Setting {number + 1} of {strips.settings}, beside {DESIGN}, which is "
+                head += f"setting {strips.chosen + 1}.\n"
+                texts[f"setting_{number + 1}.toml"] = head + design_text(other, folder, left_out)
+    return texts
 
 
 class _Sought(NamedTuple):

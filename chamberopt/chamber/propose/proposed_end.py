@@ -271,8 +271,8 @@ def strip(mesh: PartMesh, target: Target, turns: Turns, longest: float) -> HeldE
     reason = (
         f"{target.reason}; A STRIP AT A TIME, in {count} settings: it is moved along the "
         f"{'xyz'[axis]} of its file by {1e3 * pitch:.3g} mm of {1e3 * extent:.3g} mm between them"
-        f"{over}, and each takes the treatment time; where the part ends, a plate closes the "
-        "chamber"
+        f"{over}, and each takes its treatment time (setting_N.toml); where the part ends, a plate "
+        "closes the chamber"
     )
     keys = {**target.keys, "box_mm": strips.box_mm(mesh, chosen), "cut": True}
     of_strip = Target(keys, target.triangles & inside, reason)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from chamberopt.chamber.checks.openings import (
     part_at_wall,
 )
 from chamberopt.chamber.checks.place_names import around
-from chamberopt.chamber.part import chosen_on_part, chosen_triangles
+from chamberopt.chamber.part import chosen_on_part, of_target
 from chamberopt.chamber.propose.pose import Turns
 from chamberopt.chamber.propose.proposal import Proposal, touched_share
 from chamberopt.chamber.propose.proposed_arbor import Bore, find_bores
@@ -212,7 +212,7 @@ class LeftOut:
 def find_left_out(proposal: Proposal) -> list[LeftOut]:
     """Return what of a proposed target faces away from the sonotrode or is hidden from the shot."""
     mesh, part = proposal.mesh, proposal.design.part
-    target, area = chosen_triangles(mesh, part.target), areas(mesh.vertices, mesh.triangles)
+    target, area = of_target(mesh, part.target), areas(mesh.vertices, mesh.triangles)
     down = -rotation_matrix(part.rotate_deg)[2]
     normals = unit_vectors(area_vectors(mesh.vertices, mesh.triangles))
     away = target & (normals @ down < np.cos(np.radians(AWAY_DEG)))
@@ -262,19 +262,11 @@ def unlike_settings(proposal: Proposal, strips: Strips) -> str:
 
     In each the part is moved so that another strip of the target is where the proposed one is.
     """
-    design, why = proposal.design, {}
+    why: dict[int, str] = {}
     proposed = _rooms(proposal.chamber)
     for number in (k for k in range(strips.settings) if k != strips.chosen):
-        by_mm = 1e3 * (strips.chosen - number) * strips.pitch
-        moved: dict[str, Any] = {"part.target.box_mm": strips.box_mm(proposal.mesh, number)}
-        places = {"part": design.part.model_dump(mode="json")}
-        steps = enumerate(design.steps or ())
-        places |= {f"steps.{k}.part": one.part for k, one in steps if one.part}
-        for name, part in places.items():
-            if "offset_mm" in part:
-                moved[f"{name}.offset_mm.0"] = part["offset_mm"][0] + by_mm
         try:
-            rooms = _rooms(build_chamber(design.changed(moved)))
+            rooms = _rooms(build_chamber(in_setting(proposal, strips, number).design))
         except InputError as error:
             text = one_line(str(error)).partition(";")[0]
             why[number + 1] = OTHER_HOLES if text.startswith("mask.") else text
@@ -292,6 +284,39 @@ def unlike_settings(proposal: Proposal, strips: Strips) -> str:
         f"SETTINGS {', '.join(map(str, why))} of {strips.settings} need a chamber of their own: "
         f"{'; '.join(dict.fromkeys(why.values()))}"
     )
+
+
+def in_setting(proposal: Proposal, strips: Strips, number: int) -> Proposal:
+    """Return a proposal whose part is moved so that another strip of its target is peened.
+
+    Its chamber stays the one of the proposal, which may not suit it.
+
+    Raises InputError if the part would be too far from the chamber.
+    """
+    design, tables, box = proposal.design, proposal.tables, strips.box_mm(proposal.mesh, number)
+    by_mm = 1e3 * (strips.chosen - number) * strips.pitch
+
+    def moved(part: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a table of [part] moved along the strips as they lie in its pose."""
+        way = rotation_matrix(part.get("rotate_deg", design.part.rotate_deg))[:2, strips.axis]
+        offset = np.round(np.asarray(part["offset_mm"]) + by_mm * way, 3) + 0.0
+        return {**part, "offset_mm": [float(one) for one in offset]}
+
+    offset = {"offset_mm": moved({"offset_mm": design.part.offset_mm})["offset_mm"]}
+    tables = {
+        **tables,
+        "part": {**tables["part"], **offset},
+        "part.target": {**tables["part.target"], "box_mm": box},
+    }
+    changes: dict[str, Any] = {"part.target.box_mm": box, "part.offset_mm": offset["offset_mm"]}
+    if steps := tables.get("", {}).get("steps"):
+        steps = [
+            {**one, "part": moved(one["part"])} if "offset_mm" in one.get("part", {}) else one
+            for one in steps
+        ]
+        tables[""] = {**tables[""], "steps": steps}
+        changes["steps"] = steps
+    return replace(proposal, design=design.changed(changes), tables=tables)
 
 
 def _rooms(chamber: Chamber) -> tuple[Chamber, ...]:

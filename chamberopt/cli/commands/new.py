@@ -164,9 +164,12 @@ def new(
     print_remarks(f"warning: {one.text}" for one in done.made.warnings)
     if json:
         studies = [str(out / name) for name in done.studies]
-        print_json({**asdict(words), "design": str(out / DESIGN), "studies": studies})
+        settings = {"settings": [str(out / name) for name in done.settings]}
+        settings = settings if done.settings else {}
+        print_json({**asdict(words), "design": str(out / DESIGN), "studies": studies, **settings})
         return
-    show([f"design in {out / DESIGN}", *(f"study in {out / name}" for name in done.studies)])
+    designs = [f"design in {out / name}" for name in (DESIGN, *done.settings)]
+    show([*designs, *(f"study in {out / name}" for name in done.studies)])
 
 
 def _asked_unit(part: Path, sizes: Mapping[str, str]) -> str:

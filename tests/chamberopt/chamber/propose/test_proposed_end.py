@@ -10,10 +10,11 @@ import pytest
 import trimesh
 from manifold3d import Manifold, Mesh
 
+from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.propose import proposed_mask
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.held_proposal import rests
-from chamberopt.chamber.propose.proposal import Wanted
+from chamberopt.chamber.propose.proposal import Wanted, nested
 from chamberopt.chamber.propose.proposed_end import (
     Shape,
     bare_end,
@@ -25,12 +26,19 @@ from chamberopt.chamber.propose.proposed_end import (
     root_out,
     strip,
 )
-from chamberopt.chamber.propose.proposed_mask import rows_of, unlike_settings
+from chamberopt.chamber.propose.proposed_mask import (
+    find_left_out,
+    in_setting,
+    rows_of,
+    unlike_settings,
+)
 from chamberopt.chamber.propose.proposed_sizes import propose_sizes
 from chamberopt.chamber.propose.proposed_target import Surface, Target
 from chamberopt.common.errors import InputError
+from chamberopt.design.design import Design, validate
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.triangles import areas
+from chamberopt.workflows.propose import _settings_beside
 from tests.chamberopt.chamber.propose.test_proposed_arbor import drum, part_of
 from tests.helpers.eight_parts import EIGHT_PARTS
 
@@ -260,6 +268,21 @@ def test_what_no_sonotrode_carries_is_peened_a_strip_at_a_time(
     # A plate is alike in all settings; of its ends it goes out of no wall that is closed.
     assert made.strips is not None
     assert unlike_settings(made, made.strips) == ""
+    assert not any("direction" in one.keys for one in find_left_out(made))  # of 12 triangles
+    texts = _settings_beside(made, tmp_path, [])
+    chosen = made.strips.chosen
+    assert [*texts] == [f"setting_{k + 1}.toml" for k in range(made.settings) if k != chosen]
+    assert texts["setting_1.toml"].startswith(f"# Setting 1 of {made.settings}, beside design.toml")
+    for number in (0, made.settings - 1):
+        other = in_setting(made, made.strips, number)
+        assert validate(Design, nested(other.tables)).part == other.design.part
+        chamber = build_chamber(other.design)
+        own = chamber.part
+        assert 1e6 * chamber.exposed_area[own.target].sum() == pytest.approx(
+            whole / made.settings, rel=1e-3
+        )
+        along = own.vertices[own.triangles[own.target], 0]
+        assert along.min() + along.max() == pytest.approx(0.0, abs=1e-4)
 
     def no_plug(_: object) -> None:
         raise InputError("mask.at: it touches none of these faces inside the room; give others")
