@@ -215,7 +215,10 @@ def _sentence(made: Proposal) -> str:
     design = made.design
     balls = " and then ".join(_balls(made))
     area = area_in_mm2(_target_area(made))
-    strips = f", in each of {made.settings} settings" if made.settings > 1 else ""
+    strips = ""
+    if made.strips is not None:
+        one = f"setting {made.strips.chosen + 1}"
+        strips = f", in {'each' if made.strips.are_alike else one} of {made.settings} settings"
     return (
         f"Peen {one_line(_target(made))} ({area}{strips}) of "
         f"{one_line(design.part.mesh_path.name)} for {_time(made)} with {balls}, the sonotrode at "

@@ -46,9 +46,12 @@ END, LONG_END = 0.15, 0.25  # length of the end over the part's, the latter if n
 STUBBY, BESIDE = 0.25, 0.04
 ONE_PIECE = 0.95  # least share of an end's area in one connected piece, which leaves out specks
 TIP, STRAIGHT = 0.25, 0.8  # of an end: near its tip, and width there over that where it begins
-ALIKE = 0.05  # difference of that from which on it decides which end is held
+# Difference of that from which on it decides which end is held; relative one of areas of strips.
+ALIKE = 0.05
 UPRIGHT = 0.999  # cosine from which on an axis of the part's file is one of the chamber's
 LEVEL = 1e-3  # cosine to the vertical below which it is level
+# A face within SAME_PLANE [m] of a plane lies in it; so many places beside it are tried.
+SAME_PLANE, MOST_SHIFTS = 5e-5, 40
 LARGE = 0.5  # least area of the strip that is proposed over the largest one's
 SLIMMER = 0.8  # area of the lower end over the upper one's, below which the part is turned over
 MARGIN_MM = 1.0  # of boxes round the part
@@ -72,21 +75,38 @@ class Strips(NamedTuple):
         axis: number of the axis.
         low: where the first one begins [m].
         pitch: length of each [m].
-        settings: number of them.
+        areas: area of the target in each [m²].
         chosen: number of the proposed one, from 0.
     """
 
     axis: int
     low: float
     pitch: float
-    settings: int
+    areas: tuple[float, ...]
     chosen: int
 
+    @property
+    def settings(self) -> int:
+        """How many there are."""
+        return len(self.areas)
+
+    @property
+    def are_alike(self) -> bool:
+        """Whether the target's areas in them differ by little."""
+        return min(self.areas) > (1.0 - ALIKE) * max(self.areas)
+
     def box_mm(self, mesh: PartMesh, number: int) -> list[list[float]]:
-        """Return the box [mm], as designs have it, round one of them."""
+        """Return the box [mm], as designs have it, round one of them.
+
+        The first and the last go beyond the part, so that they have what lies in its end faces.
+        """
         low, high = (1e3 * (self.low + k * self.pitch) for k in (number, number + 1))
         corners = box_beyond(mesh, self.axis, True, low)
-        corners[1][self.axis] = round(high, 3)
+        beyond = box_beyond(mesh, self.axis, False, high)
+        if number == 0:
+            corners[0] = beyond[0]
+        if number < self.settings - 1:
+            corners[1] = beyond[1]
         return corners
 
 
@@ -254,19 +274,20 @@ def strip(mesh: PartMesh, target: Target, turns: Turns, longest: float) -> HeldE
     if count < 2 or not is_level or "box_mm" in target.keys:
         return None
     pitch = extent / count
-    strips = Strips(axis, low, pitch, count, 0)
+    shift = _off_faces(mesh, target.triangles, axis, low + pitch * np.arange(1, count))
+    strips = Strips(axis, low + shift, pitch, (0.0,) * count, 0)
 
     def area_in(number: int) -> float:
         cut = cut_shape(mesh, target.triangles, strips.box_mm(mesh, number))
         return float(areas(cut.vertices, cut.triangles)[cut.target].sum())
 
-    each = [area_in(k) for k in range(count)]
+    each = tuple(area_in(k) for k in range(count))
     like = [k for k in range(count) if each[k] > LARGE * max(each)]
     chosen = min(like, key=lambda k: abs(2 * k + 1 - count))
-    places = mesh.vertices[mesh.triangles][..., axis]
-    inside = (places.max(axis=1) >= low + chosen * pitch) & (
-        places.min(axis=1) <= low + (chosen + 1) * pitch
-    )
+    strips = strips._replace(areas=each, chosen=chosen)
+    low_mm, high_mm = (corner[axis] for corner in strips.box_mm(mesh, chosen))
+    places = 1e3 * mesh.vertices[mesh.triangles][..., axis]
+    inside = (places.max(axis=1) >= low_mm) & (places.min(axis=1) <= high_mm)
     over = ", or turned end for end if its halves are alike" if count == 2 else ""
     reason = (
         f"{target.reason}; A STRIP AT A TIME, in {count} settings: it is moved along the "
@@ -276,8 +297,24 @@ def strip(mesh: PartMesh, target: Target, turns: Turns, longest: float) -> HeldE
     )
     keys = {**target.keys, "box_mm": strips.box_mm(mesh, chosen), "cut": True}
     of_strip = Target(keys, target.triangles & inside, reason)
-    strips = strips._replace(chosen=chosen)
     return HeldEnd(of_strip, turns, np.eye(3)[axis], {}, ~inside, True, strips)
+
+
+def _off_faces(mesh: PartMesh, target: np.ndarray, axis: int, places: np.ndarray) -> float:
+    """Return by how much planes across an axis are moved so that no face of a target is in one [m].
+
+    Such a face would belong to neither of the strips beside the plane.
+
+    Args:
+        target: marks the triangles of the target, (m,).
+        places: of the planes [m], (k,).
+    """
+    corners = mesh.vertices[mesh.triangles[target]][..., axis]
+    flat = corners.mean(axis=1)[np.ptp(corners, axis=1) < SAME_PLANE]
+    for shift in (0.0, *(sign * k * SAME_PLANE for k in range(2, MOST_SHIFTS) for sign in (1, -1))):
+        if not (np.abs(flat[:, None] - (places + shift)) < SAME_PLANE).any():
+            return shift
+    return 0.0
 
 
 def cut_shape(mesh: PartMesh, target: np.ndarray, box_mm: list[list[float]] | None) -> Shape:

@@ -212,6 +212,29 @@ def of_area(mesh: PartMesh, target: np.ndarray, box: list[list[float]] | None) -
     return 1e6 * float(areas(cut.vertices, cut.triangles)[cut.target].sum())
 
 
+def ends_of(mesh: PartMesh) -> list[int]:
+    """Numbers of the vertices with the least and the largest x."""
+    return [int(mesh.vertices[:, 0].argmin()), int(mesh.vertices[:, 0].argmax())]
+
+
+@pytest.mark.parametrize("step", [0.0, 200.0, 300.0])
+def test_what_lies_across_a_strips_end_is_in_a_strip(step: float) -> None:
+    """The bar's end faces, and a step across it in the plane between two strips."""
+    bar = Manifold.cube((400.0, 40.0, 20.0))
+    if step:
+        bar += Manifold.cube((step, 40.0, 30.0))
+    mesh, body = part_of(bar)
+    wanted = body.face_normals[:, 2] > -0.9
+    one = strip(mesh, Target({"faces": []}, wanted, "all but its bottom"), UPRIGHT, 150e-3)
+    assert one is not None
+    assert one.strips is not None
+    assert one.strips.settings > 2
+    each = [of_area(mesh, wanted, one.strips.box_mm(mesh, k)) for k in range(one.strips.settings)]
+    assert sum(each) == pytest.approx(body.area_faces[wanted].sum(), rel=1e-6)
+    assert 1e6 * np.array(one.strips.areas) == pytest.approx(each)
+    assert one.strips.are_alike == (min(each) > 0.95 * max(each))
+
+
 @pytest.mark.parametrize("finer", [0, 2])
 @pytest.mark.parametrize(("longest", "count"), [(60.0, 7), (200.0, 2), (399.0, 2)])
 def test_strips_of_a_target_are_equal_however_it_is_divided(
@@ -230,7 +253,8 @@ def test_strips_of_a_target_are_equal_however_it_is_divided(
     assert one.strips.settings == count
     assert np.abs(one.axis).argmax() == 0
     box = one.target.keys["box_mm"]
-    assert box[1][0] - box[0][0] == pytest.approx(400.0 / count, abs=2e-3)
+    low, high = np.clip([box[0][0], box[1][0]], *(1e3 * mesh.vertices[:, 0].take(ends_of(mesh))))
+    assert high - low == pytest.approx(400.0 / count, abs=2e-3)
     assert of_area(mesh, sides, None) == pytest.approx(2 * 400.0 * 20.0)
     assert of_area(mesh, sides, box) == pytest.approx(2 * 400.0 * 20.0 / count, rel=1e-4)
     assert f"in {count} settings" in one.target.reason
