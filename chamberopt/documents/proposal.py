@@ -217,8 +217,9 @@ def _sentence(made: Proposal) -> str:
     area = area_in_mm2(_target_area(made))
     strips = ""
     if made.strips is not None:
-        one = f"setting {made.strips.chosen + 1}"
-        strips = f", in {'each' if made.strips.are_alike else one} of {made.settings} settings"
+        count = made.settings
+        one = f"in setting {made.strips.chosen + 1} of {count}"
+        strips = f", {f'in each of {count} settings' if made.strips.are_alike else one}"
     return (
         f"Peen {one_line(_target(made))} ({area}{strips}) of "
         f"{one_line(design.part.mesh_path.name)} for {_time(made)} with {balls}, the sonotrode at "
