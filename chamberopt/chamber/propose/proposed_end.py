@@ -288,7 +288,8 @@ def strip(mesh: PartMesh, target: Target, turns: Turns, longest: float) -> HeldE
     low_mm, high_mm = (corner[axis] for corner in strips.box_mm(mesh, chosen))
     places = 1e3 * mesh.vertices[mesh.triangles][..., axis]
     inside = (places.max(axis=1) >= low_mm) & (places.min(axis=1) <= high_mm)
-    over = ", or turned end for end if its halves are alike" if count == 2 else ""
+    is_even = count == 2 and strips.are_alike
+    over = ", or turned end for end if its halves are alike" if is_even else ""
     reason = (
         f"{target.reason}; A STRIP AT A TIME, in {count} settings: it is moved along the "
         f"{'xyz'[axis]} of its file by {1e3 * pitch:.3g} mm of {1e3 * extent:.3g} mm between them"
