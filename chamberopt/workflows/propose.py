@@ -303,7 +303,9 @@ class _Pilots:
         made, wanted, found = propose_quicker(way, self._again, self._briefly)
         now = Compared(*propose_second_pose(made, found, self._briefly))
         over = bool(now.made.design.steps)
-        return now, replace(wanted, turned_over=over, may_turn=turns(now.made))
+        is_turned, leaves_end = turns(now.made), now.made.leaves_end
+        wanted = replace(wanted, turned_over=over, may_turn=is_turned, may_leave_end=leaves_end)
+        return now, wanted
 
     def _sought(self, now: Compared, wanted: Wanted) -> _Sought:
         """Return what is sought for the part as it stands in a proposal.

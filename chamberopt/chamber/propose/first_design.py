@@ -148,13 +148,14 @@ def propose(
     else:
         turns = pose_by_size(*shape, wanted.pose)
         pose_reason = f"{wanted.pose.replace('-', ' ')}, as asked"
+    keeps_target = bool(asked) or not wanted.may_leave_end
     if wanted.pose in AT_SIDE:
-        return _lying(path, wanted, mesh, known, target, turns, pose_reason, bool(asked))
-    end = None if asked else held_end(mesh, target, turns)
+        return _lying(path, wanted, mesh, known, target, turns, pose_reason, keeps_target)
+    end = None if keeps_target else held_end(mesh, target, turns)
     made = _proposed(path, wanted, mesh, known, target, turns, pose_reason, end)
     if end is not None and "holder" not in made.tables:  # nothing holds the end: it is peened too
         return _proposed(path, wanted, mesh, known, target, turns, pose_reason, None)
-    if asked or wanted.pose or end is not None or not hangs_by_a_face(made):
+    if keeps_target or wanted.pose or end is not None or not hangs_by_a_face(made):
         return made
     end = held_end(mesh, target, made.design.part.rotate_deg, of_any=True)
     if end is not None:
@@ -412,7 +413,8 @@ def _proposed(
     made = only_touched(made, floor, wanted.shop)
     if wanted.ball_mm is not None and touched_share(made) < LEAST_TOUCHED:
         raise InputError(_too_large(made, shop.stock_mm(shot)))
-    made = replace(made, reasons={**made.reasons, **_room_reason(made, floor)})
+    left_out = end is not None and end.target is not whole
+    made = replace(made, reasons={**made.reasons, **_room_reason(made, floor)}, leaves_end=left_out)
     if spare is None or end is not None or wanted.pose is not None or not grips_poorly(made):
         return made
     upright = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, "standing")

@@ -16,6 +16,7 @@ from chamberopt.chamber.checks.check import touched
 from chamberopt.chamber.checks.place_names import PART, one_of
 from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.propose.proposal import (
+    HarmError,
     Proposal,
     Tables,
     checked,
@@ -233,10 +234,12 @@ def _harmless(
         hidden: share of the target that they may keep from the balls.
     """
     try:
-        made = checked(tables, reasons, floor, before.known, before.mesh, shop)
+        made = checked(tables, reasons, floor, before.known, before.mesh, shop, before)
         _build_at_extremes(made)
     except UnreadableError:
         raise
+    except HarmError as error:
+        return None, f"with the {kind}: {error.warning.beginning}"
     except InputError as error:
         return None, str(error)
     if touched_share(before) - touched_share(made) > hidden:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.check import shot_reach, touched, warnings
+from chamberopt.chamber.checks.check import first_warnings, shot_reach, touched, warnings
 from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
 from chamberopt.chamber.checks.warning import UNPEENED, DesignWarning, WarningKind
 from chamberopt.chamber.propose.pose import Pose
@@ -18,7 +18,7 @@ from chamberopt.chamber.propose.proposed_end import Strips
 from chamberopt.chamber.propose.proposed_floor import Floor
 from chamberopt.chamber.propose.proposed_sizes import Sizes
 from chamberopt.chamber.propose.proposed_target import Surface
-from chamberopt.chamber.scene import MAX_BALLS
+from chamberopt.chamber.scene import MAX_BALLS, chamber_mesh
 from chamberopt.chamber.shop import Shop, ShopSonotrode
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_fields import allowed_range
@@ -50,6 +50,14 @@ Tables = dict[str, dict[str, Any]]
 """Tables of a design file by dotted name, as TOML values."""
 
 
+class HarmError(Exception):
+    """A proposal does harm that another one does not; `warning` tells which."""
+
+    def __init__(self, warning: DesignWarning) -> None:
+        super().__init__(warning.message)
+        self.warning = warning
+
+
 @dataclass(frozen=True)
 class Wanted:
     """The user's wishes for a proposed design. None or an empty text leaves the choice open."""
@@ -65,6 +73,7 @@ class Wanted:
     coverage: float | None = None  # [%], 200 is twice the time to 98 %
     turned_over: bool = False  # after half of the time, as a second step
     may_turn: bool = True  # about the axis of a bore, where that brings no new fault
+    may_leave_end: bool = True  # out of the target, to hold the part by it
 
 
 @dataclass(frozen=True)
@@ -111,6 +120,7 @@ class Proposal:
     strips: Strips | None = None  # of which the target is one
     # True if its chamber holds fewer balls than it should, as more take too long.
     is_capped: bool = False
+    leaves_end: bool = False  # true if the part is held by an end that its target leaves out
     closed: tuple[str, ...] = ()  # sides at which a face of the part is the wall, such as "-x"
     # Of all replicas of a candidate [s], to know the time in which its target is covered; None if
     # no pilot ran, or balls do not touch enough of the target.
@@ -140,10 +150,14 @@ def checked(
     known: Sequence[Surface],
     mesh: PartMesh,
     shop: Shop | None,
+    beside: Proposal | None = None,
 ) -> Proposal:
     """Choose the mass of the balls for these values, and return the built and checked proposal.
 
-    Raises InputError if the chamber would be too large or cannot be built.
+    Raises:
+        InputError: the chamber would be too large or cannot be built.
+        HarmError: what is seen at once, before it is known where the shot reaches, is harm that
+            the proposal `beside` does not do.
 
     Args:
         tables: tables of the design file. Their mass of the balls is replaced.
@@ -152,6 +166,7 @@ def checked(
         known: surfaces to choose the target from.
         mesh: the part.
         shop: the shop in whose bounds the study stays, if it is known.
+        beside: a proposal that is kept if this one does harm; None to check it in any case.
     """
     sizes = floor.sizes
     largest = max(size for key, size in tables["chamber"].items() if key.endswith("_mm"))
@@ -168,6 +183,10 @@ def checked(
     tables["tolerances"] = propose_tolerances(tables)
     design = validate(Design, nested(tables))
     in_words = {"shot.mass_g": f"{charge.reason}: {design.shot.count}", "tolerances": OF_LENGTHS}
+    if beside is not None and not chamber.steps:
+        at_once = first_warnings(design, chamber, chamber_mesh(chamber))
+        if harm := _first_new(at_once, beside):
+            raise HarmError(harm)
     found = tuple(warnings(design, chamber))
     if math.isinf(floor.lean):
         found = (DesignWarning(WarningKind.WIDE_FLOOR, f"chamber: {floor.reason}"), *found)
@@ -230,13 +249,19 @@ def new_harm(made: Proposal, before: Proposal) -> DesignWarning | None:
     jams balls in the place of another one. That balls do not get to some of the target is no harm:
     it counts in what they serve and touch.
     """
-    known = {one.subject for one in before.warnings}
-    for one in made.warnings:
-        if one.kind not in COUNTED and one.subject not in known:
-            return one
+    if harm := _first_new(made.warnings, before):
+        return harm
     if len(made.jams) > len(before.jams):
         return DesignWarning(WarningKind.JAM, "balls jam in a gap")
     return None
+
+
+def _first_new(found: Iterable[DesignWarning], before: Proposal) -> DesignWarning | None:
+    """Return the first of some warnings that counts as harm and that a proposal does not have."""
+    known = {one.subject for one in before.warnings}
+    return next(
+        (one for one in found if one.kind not in COUNTED and one.subject not in known), None
+    )
 
 
 def touched_share(made: Proposal) -> float:
