@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.checks.openings import PLATE
 from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.fixture import size_in_words
 from chamberopt.common.estimate import Estimate
@@ -355,7 +356,7 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
         place = ", ".join(plain(round(1e3 * x, 1) + 0.0) for x in way.place)
         frame = "" if number else " in the chamber's frame"
         rows.append(
-            ("opening", f"{_of_opening(way)} round ({place}) mm{frame}; {_beyond(way, openings)}")
+            ("opening", f"{_of_opening(way)} at ({place}) mm{frame}; {_beyond(way, openings)}")
         )
     yield from _first(rows, "openings")
     faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
@@ -379,12 +380,18 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
 def _of_opening(one: Opening) -> str:
     """Return in words how large an opening is, and in which wall."""
     sides = [plain(round(1e3 * x, 1) + 0.0) for x in one.size]
-    ways = zip("xyz", one.way, strict=True)
+    level = np.hypot(*one.way[:2]) or 1.0  # walls may lean
+    ways = zip("xy", (float(x / level) for x in one.way[:2]), strict=True)
     at = next((f" at {'+−'[x < 0.0]}{axis}" for axis, x in ways if abs(x) > SQUARE), "")
     wall = one.wall if one.wall == CEILING else f"{one.wall}{at}"
-    if min(one.size) < EDGE:
+    if one.form == "edge" or min(one.size) < EDGE:
         return f"{sides[int(np.argmax(one.size))]} mm of {wall}, which ends on the part,"
-    return f"{' × '.join(sides)} mm in {wall}"
+    if one.form == "round":
+        return f"round, Ø {plain(round(500.0 * sum(one.size), 1))} mm, in {wall}, its middle"
+    size = f"{' × '.join(sides)} mm"
+    if one.form == "other":
+        return f"along the part's section, within {size}, no rectangle, in {wall}, its middle"
+    return f"{size} in {wall}, its middle"
 
 
 def _beyond(one: Opening, openings: Sequence[Opening]) -> str:
@@ -393,7 +400,11 @@ def _beyond(one: Opening, openings: Sequence[Opening]) -> str:
         return "the part fills it"
     farthest = max(other.beyond for other in openings)
     clamp = ": clamp it there" if one.beyond >= min(CLAMPED, farthest) else ""
-    return f"the part stands out by {plain(1e3 * one.beyond, 2)} mm{clamp}"
+    wider = ""
+    if one.wider is not None:
+        size = " × ".join(plain(round(1e3 * x, 1)) for x in one.wider)
+        wider = f"; it widens to {size} mm in the first {plain(1e3 * PLATE)} mm outside"
+    return f"the part stands out by {plain(1e3 * one.beyond, 2)} mm{clamp}{wider}"
 
 
 def key_row(key: str, value: Any) -> Row:

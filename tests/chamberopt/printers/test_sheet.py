@@ -109,12 +109,24 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
     tables = setting_tables(bore, AsBuilt((50.0,), openings))
     rows = next(one for one in tables if one.caption == "Chamber").rows
     assert [text for name, text in rows if name == "opening"] == [
-        "60 × 80 mm in the wall at +y round (0, 40, 62.4) mm in the chamber's frame; the part "
-        "stands out by 9.3 mm: clamp it there",
-        "12 × 80 mm in the wall at −x round (−40, 0, 62.4) mm; the part fills it",
-        "12 mm of the ceiling, which ends on the part, round (0, 0, 119) mm; the part stands out "
+        "60 × 80 mm in the wall at +y, its middle at (0, 40, 62.4) mm in the chamber's frame; "
+        "the part stands out by 9.3 mm: clamp it there",
+        "12 × 80 mm in the wall at −x, its middle at (−40, 0, 62.4) mm; the part fills it",
+        "12 mm of the ceiling, which ends on the part, at (0, 0, 119) mm; the part stands out "
         "by 1.2 mm",
     ]
+    first = openings[0]
+    forms = [
+        first._replace(form="round", size=(0.0604, 0.06041), way=(0.0, 0.89, -0.456)),
+        first._replace(form="other", wider=(0.0612, 0.08)),
+    ]
+    tables = setting_tables(bore, AsBuilt((50.0,), forms))
+    told = next(one for one in tables if one.caption == "Chamber").rows
+    circle, section = (text.split(" in the wall")[0] for name, text in told if name == "opening")
+    assert circle == "round, Ø 60.4 mm,"
+    assert dict(told)["opening"].count("in the wall at +y, its middle") == 1
+    assert section == "along the part's section, within 60 × 80 mm, no rectangle,"
+    assert "it widens to 61.2 × 80 mm in the first 10 mm outside" in dict(told)["opening"]
     assert dict(rows)["holder"].endswith("0.2 mm of clearance all round")
     assert dict(rows)["gaps"].startswith("round the part as above, of all other joints at most 0.4")
     assert rows_of(result)["Chamber"]["gaps"].startswith("of joints and openings at most 0.42 mm")
