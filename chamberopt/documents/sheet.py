@@ -353,10 +353,9 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
         yield "holder", f"none: {out}{'' if padded else '; clamp it there'}"
     rows = []
     for number, way in enumerate(openings):
-        place = ", ".join(plain(round(1e3 * x, 1) + 0.0) for x in way.place)
         frame = "" if number else " in the chamber's frame"
         rows.append(
-            ("opening", f"{_of_opening(way)} at ({place}) mm{frame}; {_beyond(way, openings)}")
+            ("opening", f"{_of_opening(way)} at {_place(way)} mm{frame}; {_beyond(way, openings)}")
         )
     yield from _first(rows, "openings")
     faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
@@ -380,18 +379,45 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
 def _of_opening(one: Opening) -> str:
     """Return in words how large an opening is, and in which wall."""
     sides = [plain(round(1e3 * x, 1) + 0.0) for x in one.size]
-    level = np.hypot(*one.way[:2]) or 1.0  # walls may lean
-    ways = zip("xy", (float(x / level) for x in one.way[:2]), strict=True)
-    at = next((f" at {'+−'[x < 0.0]}{axis}" for axis, x in ways if abs(x) > SQUARE), "")
-    wall = one.wall if one.wall == CEILING else f"{one.wall}{at}"
+    wall = _wall_of(one)
     if one.form == "edge" or min(one.size) < EDGE:
         return f"{sides[int(np.argmax(one.size))]} mm of {wall}, which ends on the part,"
     if one.form == "round":
         return f"round, Ø {plain(round(500.0 * sum(one.size), 1))} mm, in {wall}, its middle"
     size = f"{' × '.join(sides)} mm"
     if one.form == "other":
-        return f"along the part's section, within {size}, no rectangle, in {wall}, its middle"
+        drawn = "" if one.outline is None else ", drawn on the last page"
+        section = f"along the part's section, within {size}, no rectangle{drawn}"
+        return f"{section}, in {wall}, its middle"
     return f"{size} in {wall}, its middle"
+
+
+def _place(one: Opening) -> str:
+    """Return the middle of an opening [mm] as text."""
+    return f"({', '.join(plain(round(1e3 * x, 1) + 0.0) for x in one.place)})"
+
+
+def _wall_of(one: Opening) -> str:
+    """Return in words in which wall an opening is."""
+    level = np.hypot(*one.way[:2]) or 1.0  # walls may lean
+    ways = zip("xy", (float(x / level) for x in one.way[:2]), strict=True)
+    at = next((f" at {'+−'[x < 0.0]}{axis}" for axis, x in ways if abs(x) > SQUARE), "")
+    return one.wall if one.wall == CEILING else f"{one.wall}{at}"
+
+
+OUTLINES = (
+    "What the part fills of the wall, seen from outside, without clearance. Dashed: where it goes "
+    "on over an edge of the wall."
+)
+
+
+def drawn_openings(built: AsBuilt) -> list[tuple[str, Opening]]:
+    """Return the openings that are cut along the part's section, each with its place in words."""
+    return [
+        (f"{_wall_of(one)}, middle at\n{_place(one)} mm", one)
+        for one in built.openings
+        if one.form == "other" and one.outline is not None
+    ][:MOST_ROWS]
 
 
 def _beyond(one: Opening, openings: Sequence[Opening]) -> str:

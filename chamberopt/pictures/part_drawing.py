@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.checks.openings import Opening
     from chamberopt.design.sonotrode import Face
 
 # All lengths are in mm on the page.
@@ -191,7 +192,7 @@ def draw_chamber(
     view = View(0, scale, corner, low[:2], high[:2], np.zeros(2))
     _draw_plan(axes, chamber, view, planes, limits)
     dashed = [] if face is None else _draw_face(axes, chamber, view, face)
-    text = f"{plain(scale)}:1" if scale >= 1.0 else f"1:{plain(1.0 / scale)}"
+    text = _scale_in_words(scale)
     what = "Section A–A" if len(planes) == 1 else "Sections A–A and B–B"
     dashes = f", dashed: {' and '.join(dashed)}" if dashed else ""
     return f"{what} and plan, scale {text}{dashes}"
@@ -422,3 +423,82 @@ def _lines(axes: Axes, view: View, lines: np.ndarray, colour: str, width: float)
 
 def _label(axes: Axes, x: float, y: float, text: str) -> None:
     axes.text(x, y, text, size=6.5, color=DARK_GREY, va="bottom", bbox=LABEL)
+
+
+OPENINGS_A_ROW = 2
+CAPTION = 8.0  # mm, of the words above the outline of an opening
+
+
+def draw_openings(
+    axes: Axes, openings: Sequence[tuple[str, Opening]], left: float, top: float, size: Point
+) -> str:
+    """Draw the outlines of openings with their two dimensions, and return their scale in words.
+
+    Args:
+        axes: axes of the whole page, in mm.
+        openings: openings with an outline, each with its words.
+        left, top: upper left corner of the drawing.
+        size: width and height that it may have.
+    """
+    room = size[0] / OPENINGS_A_ROW - 2.0 * BESIDE
+    rows = [openings[k : k + OPENINGS_A_ROW] for k in range(0, len(openings), OPENINGS_A_ROW)]
+    wide = 1e3 * max(one.size[0] for _, one in openings)
+    tall = [1e3 * max(one.size[1] for _, one in row) for row in rows]
+    words = len(rows) * (CAPTION + BELOW)
+    scale = next(
+        (x for x in SCALES if x * wide <= room and x * sum(tall) + words <= size[1]), SCALES[-1]
+    )
+    y = top
+    for row, height in zip(rows, tall, strict=True):
+        low = y - CAPTION - scale * height
+        for column, (text, one) in enumerate(row):
+            x = left + column * size[0] / OPENINGS_A_ROW + BESIDE
+            _draw_opening(axes, one, (x, low), scale)
+            axes.text(x, y, text, size=SIZE, va="top", parse_math=False)
+        y = low - BELOW
+    return _scale_in_words(scale)
+
+
+def _draw_opening(axes: Axes, one: Opening, corner: Point, scale: float) -> None:
+    """Draw the outline of an opening above and right of a corner on the page [mm]."""
+    assert one.outline is not None
+    half = 500.0 * np.array(one.size)
+    view = View(0, scale, np.array(corner), -half, half, np.zeros(2))
+    edges = _closing(one.outline)
+    closed = np.concatenate([one.outline, edges])
+    look: Any = {"facecolor": PART, "edgecolor": DARK_GREY, "hatch": "////", "lw": 0.0}
+    _fill(axes, view, closed, view.window(axes), **look)
+    _lines(axes, view, one.outline, BLACK, 1.1)
+    for line in view.place(1e3 * edges):
+        axes.plot(*line.T, color=BLACK, lw=0.6, ls=(0, (4, 3)))
+    (x1, y1), (x2, y2) = view.place([-half, half])
+    wide, tall = (plain(round(float(2.0 * side), 1)) for side in half)
+    dimension(axes, (x1, y1), (x2, y1), 5.0, wide)
+    dimension(axes, (x1, y1), (x1, y2), 5.0, tall, upright=True)
+
+
+def _closing(outline: np.ndarray) -> np.ndarray:
+    """Return the lines that close an outline where the part goes on over an edge of its wall.
+
+    Args:
+        outline: directed sides (k, 2, 2), all round the part in the same sense.
+    Returns:
+        Lines (n, 2, 2), one from the end of each open row of sides.
+    """
+    following = {tuple(one): tuple(two) for one, two in outline.tolist()}
+    starts = [one for one in following if one not in {*following.values()}]
+    last = {}
+    for one in starts:
+        end = one
+        while end in following:
+            end = following[end]
+        last[one] = end
+    lines = [
+        (end, min([x for x in starts if x != own] or [own], key=lambda x: math.dist(x, end)))
+        for own, end in last.items()
+    ]
+    return np.array(lines).reshape(-1, 2, 2)
+
+
+def _scale_in_words(scale: float) -> str:
+    return f"{plain(scale)}:1" if scale >= 1.0 else f"1:{plain(1.0 / scale)}"

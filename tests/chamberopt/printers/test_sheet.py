@@ -28,6 +28,7 @@ from chamberopt.documents.sheet import (
     AsBuilt,
     alarms,
     chamber_limits,
+    drawn_openings,
     first_checks,
     limit_tables,
     process_sheet,
@@ -36,7 +37,7 @@ from chamberopt.documents.sheet import (
 )
 from chamberopt.documents.wording import metric_label, plain
 from chamberopt.peening.tolerance_result import ToleranceResult, ToleratedFigure
-from chamberopt.pictures.part_drawing import draw_chamber, drawing_height
+from chamberopt.pictures.part_drawing import draw_chamber, draw_openings, drawing_height
 from chamberopt.pictures.section import cut, face_size_mm, inside, section_planes
 from chamberopt.printers.sheet_page import (
     HEIGHT,
@@ -130,6 +131,38 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
     assert dict(rows)["holder"].endswith("0.2 mm of clearance all round")
     assert dict(rows)["gaps"].startswith("round the part as above, of all other joints at most 0.4")
     assert rows_of(result)["Chamber"]["gaps"].startswith("of joints and openings at most 0.42 mm")
+
+
+def sides(*corners: tuple[float, float]) -> np.ndarray:
+    """The lines from each of the corners [mm] to the next one, (k, 2, 2) [m]."""
+    return 1e-3 * np.stack([corners[:-1], corners[1:]], axis=1)
+
+
+def test_outlines_of_openings_are_drawn_with_two_dimensions() -> None:
+    """A U, a U whose wall ends above it, and a wedge that goes on to both sides."""
+    legs = [(-20, 9), (-20, -9), (-17, -9), (-17, 6), (17, 6), (17, -9), (20, -9), (20, 9)]
+    wedge = np.concatenate([sides((-30, -12), (30, -8)), sides((30, 8), (-30, 12))])
+    shapes = [
+        ((40, 18), sides(*legs, legs[0]), 2 * 3 * 18 + 34 * 3),
+        ((40, 18), sides(*legs), 2 * 3 * 18 + 34 * 3),
+        ((60, 24), wedge, 60 * 20),
+    ]
+    for (wide, tall), outline, area in shapes:
+        at = (0.0, 0.0, 0.1), 0.01, (0.0, 0.0, 1.0)
+        one = Opening("the ceiling", (1e-3 * wide, 1e-3 * tall), *at, "other", outline)
+        (words, _), *_ = drawn = drawn_openings(AsBuilt((50.0,), [one, one, one]))
+        assert words.startswith("the ceiling, middle at")
+        figure = Figure(figsize=(WIDTH / 25.4, HEIGHT / 25.4))
+        axes = figure.add_axes((0, 0, 1, 1), xlim=(0, WIDTH), ylim=(0, HEIGHT))
+        scale = draw_openings(axes, drawn, MARGIN, 200.0, (180.0, 180.0))
+        assert scale == "1:1"
+        boxes = boxes_of(figure)
+        require_apart(boxes)
+        assert [text for text, _ in boxes].count(str(wide)) == 3
+        assert [text for text, _ in boxes].count(str(tall)) == 3
+        (x, y) = axes.patches[0].get_path().vertices.T
+        found = 0.5 * abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+        assert found == pytest.approx(area, rel=1e-6)
 
 
 def test_what_the_best_costs_is_on_the_sheet(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
