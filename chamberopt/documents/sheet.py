@@ -10,7 +10,8 @@ import numpy as np
 
 from chamberopt.chamber.checks.openings import PLATE
 from chamberopt.chamber.checks.place_names import CEILING
-from chamberopt.chamber.fixture import size_in_words
+from chamberopt.chamber.fixture import plugs_in_words, size_in_words
+from chamberopt.chamber.propose.pose import axis_down
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.key_words import in_words, key_in_words, title_with_unit, unit_of
 from chamberopt.common.number_text import estimate_text, percent
@@ -34,6 +35,9 @@ from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
     from chamberopt.chamber.checks.openings import Opening
+    from chamberopt.chamber.checks.strips import StripOfTarget
+    from chamberopt.chamber.fixture import Plug
+    from chamberopt.design.fixture import Holder
     from chamberopt.design.shot import ShotTable
     from chamberopt.design.sonotrode import VibratingFace
     from chamberopt.documents.coverage import Figure
@@ -178,6 +182,8 @@ class AsBuilt(NamedTuple):
 
     face_mm: tuple[float, ...]  # of the sonotrode: a diameter, or two sides
     openings: Sequence[Opening] = ()  # through which the part goes out
+    strip: StripOfTarget | None = None  # if the target is peened a strip at a time
+    plugs: Sequence[Plug] = ()  # of the mask
 
 
 def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Document:
@@ -246,8 +252,8 @@ def setting_tables(result: Result, built: AsBuilt) -> list[Table]:
     A row with an empty name holds a sentence.
     """
     return _tables([
-        ("Part and pose", _part(result)),
-        ("Chamber", _chamber(result, built.openings)),
+        ("Part and pose", _part(result, built.strip)),
+        ("Chamber", _chamber(result, built)),
         ("Sonotrode", _sonotrode(result, built.face_mm)),
         ("Shot", _shot(result)),
         ("Steps", _steps(result)),
@@ -272,7 +278,7 @@ def _tables(found: Sequence[tuple[str, Iterator[Row]]]) -> list[Table]:
     return [one for one in tables if one.rows]
 
 
-def _part(result: Result) -> Iterator[Row]:
+def _part(result: Result, strip: StripOfTarget | None) -> Iterator[Row]:
     part, turn = result.design.part, result.design.effects.part_turn
     yield "part", part.mesh_path.name
     yield "metal", _metal(result)
@@ -280,6 +286,8 @@ def _part(result: Result) -> Iterator[Row]:
         yield "pose", "as drawn with its chamber"
     else:
         yield "turned", turned(part.rotate_deg) or "as in its file"
+        if down := axis_down(part.rotate_deg):
+            yield "down", f"the {down} of its file".replace("-", "−")
         x, y = part.offset_mm
         yield "offset from the axis", f"x {plain(x)} mm, y {plain(y)} mm" if x or y else "none"
         text = f"{plain(result.design.chamber.sonotrode_distance_mm)} mm"
@@ -293,6 +301,25 @@ def _part(result: Result) -> Iterator[Row]:
         yield "turns", f"{speed} about the file's axis ({axis})"
     if area := exposed_target(result):
         yield "target", area
+    # A strip is told in a row of its own.
+    chosen = part.target.model_copy(update={} if strip is None else {"box_mm": None})
+    if words := chosen.in_words:
+        yield "target, chosen by", words
+    if strip is not None:
+        yield "a strip at a time", _of_strip(strip)
+
+
+def _of_strip(strip: StripOfTarget) -> str:
+    """Return in words which strip of the target is peened, and how the part moves for the next."""
+    low, high, length = (
+        plain(round(1e3 * x, 1) + 0.0) for x in (strip.low, strip.high, strip.high - strip.low)
+    )
+    axis = "xyz"[strip.axis]
+    return (
+        f"setting {strip.before + 1} of {strip.settings}: {axis} {low} to {high} mm of its file; "
+        f"the part is moved by {length} mm along that {axis} from one to the next, and each takes "
+        "the peening time"
+    )
 
 
 def _metal(result: Result) -> str:
@@ -312,7 +339,7 @@ def _limited(result: Result, name: str, text: str) -> str:
     return text if ends is None else f"{text} ({' to '.join(map(plain, ends))})"
 
 
-def _chamber(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
+def _chamber(result: Result, built: AsBuilt) -> Iterator[Row]:
     table = result.design.chamber.model_dump(mode="json", exclude_none=True)
     yield "shape", PurePath(table.pop("shape")).name
     for key in ("sonotrode_distance_mm", "facets", "mesh", "unit"):
@@ -327,7 +354,7 @@ def _chamber(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
     for what, several in counted.items():
         if several:
             yield what, f"{len(several)}: see the report"
-    yield from _fixtures(result, openings)
+    yield from _fixtures(result, built)
     ball = 1e3 * min(result.design.ball_diameters)
     holder = result.design.holder
     in_bore = holder is not None and holder.clearance_mm > 0.0
@@ -338,9 +365,9 @@ def _chamber(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
         yield "free volume", f"{plain(1e-3 * volume)} cm³"
 
 
-def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
+def _fixtures(result: Result, built: AsBuilt) -> Iterator[Row]:
     """Yield rows on what holds the part, where it goes out, and what masks it."""
-    holder = result.design.holder
+    holder, openings = result.design.holder, built.openings
     if holder is not None and holder.kind == "bore":
         play = "tight"
         if holder.clearance_mm:
@@ -361,8 +388,10 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
     faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
     for name, one in result.record.chamber.fixtures.items():
         size = size_in_words(one.kind, one.size_mm)
-        flush = "flush with their rims" if one.kind == "plugs" else "up to the wall"
-        text = f"{one.kind} {size or flush}"
+        if one.kind == "plugs":
+            sizes = f"{plugs_in_words(built.plugs)}, " if built.plugs else ""
+            size = f"{sizes}flush with their rims"
+        text = f"{one.kind} {size or 'up to the wall'}"
         if one.length_mm:
             text += f", {plain(one.length_mm)} mm long"
         if one.place_mm and holder is not None:
@@ -371,9 +400,21 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
                 for three in (one.place_mm, holder.axis)
             )
             text += f", from ({at}) mm along ({along}) in the chamber's frame"
+        if holder is not None and name == "holder":
+            text += _flanges(holder)
         chosen = faces[name]
         where = f" ({', '.join(chosen.surface)})" if chosen and chosen.surface != ("all",) else ""
         yield name, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part{where}"
+
+
+def _flanges(holder: Holder) -> str:
+    """Return in words the flanges of an arbor, which mask the part's ends; "" without any."""
+    if holder.kind != "arbor" or holder.diameter_mm is None or holder.thickness_mm is None:
+        return ""
+    ends = "flanges at both ends" if holder.both_sides else "a flange at the end"
+    over = f", {plain(holder.grip_mm)} mm over it as a cup" if holder.grip_mm else ""
+    size = f"Ø {plain(holder.diameter_mm)} × {plain(holder.thickness_mm)} mm"
+    return f", with {ends} of the part, {size}{over}"
 
 
 def _of_opening(one: Opening) -> str:
@@ -386,7 +427,7 @@ def _of_opening(one: Opening) -> str:
         return f"round, Ø {plain(round(500.0 * sum(one.size), 1))} mm, in {wall}, its middle"
     size = f"{' × '.join(sides)} mm"
     if one.form == "other":
-        drawn = "" if one.outline is None else ", drawn on the last page"
+        drawn = "" if one.outline is None else " (last page)"
         section = f"along the part's section, within {size}, no rectangle{drawn}"
         return f"{section}, in {wall}, its middle"
     return f"{size} in {wall}, its middle"

@@ -15,6 +15,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.checks.openings import find_openings
+from chamberopt.chamber.checks.strips import strip_of_target
+from chamberopt.chamber.fixture import plugs_of
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, write_bytes
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
@@ -258,9 +260,11 @@ def write_sheet(
     path = require_free_page(loaded.folder / SHEET if path is None else path, SHEET_FILE)
     with claim_file(path):
         chamber = load_chamber(loaded)
-        built = AsBuilt(face_size_mm(chamber), find_openings(chamber))
+        design, part = loaded.design, chamber.part
+        of_part = find_openings(chamber), strip_of_target(design, part), plugs_of(design, part)
+        built = AsBuilt(face_size_mm(chamber), *of_part)
         sheet = process_sheet(loaded, built, revision)
-        limits, face = chamber_limits(loaded), loaded.design.sonotrode.face
+        limits, face = chamber_limits(loaded), design.sonotrode.face
         pages = draw_sheet(sheet, chamber, limits, face, drawn_openings(built))
         _save(path, pages, sheet.name)
     return path, sheet

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.openings import Opening
+from chamberopt.chamber.checks.strips import StripOfTarget
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
@@ -50,7 +51,7 @@ from chamberopt.printers.sheet_page import (
     write_sheet,
 )
 from chamberopt.results.load import Result, load_result
-from chamberopt.results.records import TrappedRecord, ZoneLimit, ZoneRecord
+from chamberopt.results.records import FixtureRecord, TrappedRecord, ZoneLimit, ZoneRecord
 from tests.helpers.results.report_folders import simulated
 from tests.helpers.synthetic import chamber_round, machine_values, plate_design
 
@@ -131,6 +132,40 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
     assert dict(rows)["holder"].endswith("0.2 mm of clearance all round")
     assert dict(rows)["gaps"].startswith("round the part as above, of all other joints at most 0.4")
     assert rows_of(result)["Chamber"]["gaps"].startswith("of joints and openings at most 0.42 mm")
+
+
+def test_what_a_shop_needs_of_pose_target_strip_and_flanges(folder: Path) -> None:
+    result = load_result(folder)
+    for turns, down in (((0, 0, 0), "−z"), ((180, 0, 0), "+z"), ((0, 90, 30), "+x")):
+        design = result.design.changed({"part.rotate_deg": turns})
+        rows = rows_of(replace(result, design=design))["Part and pose"]
+        assert rows["down"] == f"the {down} of its file"
+    leaning = result.design.changed({"part.rotate_deg": (45, 0, 0)})
+    assert "down" not in rows_of(replace(result, design=leaning))["Part and pose"]
+
+    faces = ({"at_mm": (1.0, 2.25, -0.04), "alike": True}, {"at_mm": (0.0, 0.0, 0.0)})
+    named = result.design.changed({"part.target": {"surface": "root", "faces": faces}})
+    rows = rows_of(replace(result, design=named))["Part and pose"]
+    assert rows["target, chosen by"] == (
+        "the surface root of its file; 2 faces, one of them at (1, 2.2, 0) mm of its file, with "
+        "all faces alike"
+    )
+    strip = StripOfTarget(1, 0.0664, 0.1288, 0.004, 0.316)
+    table = setting_tables(result, AsBuilt((50.0,), strip=strip))[0]
+    assert dict(table.rows)["a strip at a time"].startswith(
+        "setting 2 of 5: y 66.4 to 128.8 mm of its file; the part is moved by 62.4 mm along that y"
+    )
+    for both, ends in ((True, "flanges at both ends"), (False, "a flange at the end")):
+        flanges = {"diameter_mm": 61.5, "thickness_mm": 2.0, "both_sides": both}
+        holder = {"kind": "arbor", "at": {"faces": faces[1:]}, **flanges}
+        made = FixtureRecord(
+            kind="arbor", size_mm=[25.0], length_mm=54.0, covered_mm2=9.0, covered_target_mm2=0.0
+        )
+        chamber = result.record.chamber.model_copy(update={"fixtures": {"holder": made}})
+        record = result.record.model_copy(update={"chamber": chamber})
+        held = replace(result, record=record, design=result.design.changed({"holder": holder}))
+        told = rows_of(held)["Chamber"]["holder"]
+        assert f"54 mm long, with {ends} of the part, Ø 61.5 × 2 mm" in told
 
 
 def sides(*corners: tuple[float, float]) -> np.ndarray:

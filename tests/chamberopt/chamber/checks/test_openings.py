@@ -18,6 +18,13 @@ DESIGNS = Path(__file__).resolve().parents[4] / "designs"
 def chamber_of(
     folder: Path, body: trimesh.Trimesh, plugs: dict[str, object] | None = None, **part: object
 ) -> Chamber:
+    """The chamber of `design_of`."""
+    return build_chamber(design_of(folder, body, plugs, **part))
+
+
+def design_of(
+    folder: Path, body: trimesh.Trimesh, plugs: dict[str, object] | None = None, **part: object
+) -> Design:
     """A body in mm, 15 mm over the floor of a box of 60 x 50 x 40 mm; its underside is peened.
 
     Args:
@@ -31,7 +38,7 @@ def chamber_of(
     chamber = {"shape": "box", **sizes}
     mask = None if plugs is None else {"plugs": True, "at": plugs}
     own = {"part": {**given, **part}, "chamber": chamber, "mask": mask}
-    return build_chamber(validate(Design, {**data, **own}))
+    return validate(Design, {**data, **own})
 
 
 def test_a_bar_through_both_side_walls_and_a_post_through_the_ceiling(tmp_path: Path) -> None:
