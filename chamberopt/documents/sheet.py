@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,8 +18,8 @@ from chamberopt.common.key_words import in_words, key_in_words, title_with_unit,
 from chamberopt.common.number_text import estimate_text, percent
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.calibration import why_no_intensity
-from chamberopt.design.fixture import WIDEST_GAP, tight_gap_mm
-from chamberopt.design.intensity import PredictedIntensity
+from chamberopt.design.fixture import joint_in_words, slit_in_words, slit_mm
+from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
 from chamberopt.design.materials import alloys, find
 from chamberopt.design.tolerances import USUAL, USUAL_IN_WORDS, tolerance_box
 from chamberopt.documents.answer import answer, answer_lines
@@ -50,6 +51,7 @@ TIME = "time_to_98_s"
 WIDEST_FACE = 90.0  # mm: larger faces need slots or are several (chamber/usual_shop.toml)
 SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wall is named by it
 EDGE, CLAMPED = 5e-5, 3e-3  # m: narrower openings are none; jaws take what stands out so far
+SAME_MM = 0.02  # lengths that differ by less count as equal
 JAMMED = 0.01  # least share of the shot's time, or of the impacts, in gaps that is told in red
 
 
@@ -103,6 +105,24 @@ def _wide_face(result: Result, face_mm: tuple[float, ...]) -> Iterator[str]:
             "one that moves alike all over. If yours is smaller, set several side by side or peen "
             "a strip at a time; if it has slots, measure its amplitude over the face."
         )
+
+
+def _unusual_intensity(result: Result, usual: WantedIntensity | None) -> Iterator[str]:
+    """Yield a sentence if an intensity that nobody asked for is expected off the usual range."""
+    design = result.design
+    found = PredictedIntensity.of(result.metrics, design.calibration)
+    if usual is None or found is None or design.process.intensity_mmA is not None:
+        return
+    if off := usual.off(found.value):
+        yield (
+            f"The expected Almen intensity, {plain(found.value, 2)} mmA, is "
+            f"{'below' if off < 0.0 else 'above'} {_range_text(usual)}, {usual.text}: agree on it, "
+            "or ask for another one (process.intensity_mmA)."
+        )
+
+
+def _range_text(usual: WantedIntensity) -> str:
+    return f"{plain(usual.low)} to {plain(usual.high)} mmA"
 
 
 def _size(face_mm: tuple[float, ...]) -> str:
@@ -184,6 +204,7 @@ class AsBuilt(NamedTuple):
     openings: Sequence[Opening] = ()  # through which the part goes out
     strip: StripOfTarget | None = None  # if the target is peened a strip at a time
     plugs: Sequence[Plug] = ()  # of the mask
+    usual: WantedIntensity | None = None  # Almen intensity of its metal and thickness
 
 
 def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Document:
@@ -198,9 +219,12 @@ def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Documen
     record = result.record
     start = load_start(result)
     checks, calibrated = first_checks(result), calibrated_to(result)
-    red = [
-        Sentence(text, "warning") for text in (*alarms(result), *_wide_face(result, built.face_mm))
-    ]
+    reasons = (
+        *alarms(result),
+        *_unusual_intensity(result, built.usual),
+        *_wide_face(result, built.face_mm),
+    )
+    red = [Sentence(text, "warning") for text in reasons]
     requalify = Sentence(REQUALIFY)
     content: list[Block] = [*red, *setting_tables(result, built), checks, *calibrated, requalify]
     name = f"{result.design.part.mesh_path.name}: {result.folder.resolve().name}"
@@ -246,6 +270,26 @@ def chamber_limits(result: Result) -> dict[str, tuple[float, float, float]]:
     }
 
 
+def slit_limits(result: Result) -> dict[str, tuple[float, float, float]]:
+    """Return value, least and largest value of each key of [chamber] as wide as the sonotrode.
+
+    A wall round the sonotrode's face stands beside it by a slit, which is not simulated.
+    """
+    face, chamber = result.design.sonotrode.face, result.design.chamber
+    if face is None:
+        return {}
+    long, wide = face.sides_mm
+    sides = {"diameter_mm": face.diameter_mm}
+    if face.diameter_mm is None:
+        sides = {"length_mm": long, "width_mm": wide}
+    slit = 2.0 * slit_mm(1e3 * min(result.design.ball_diameters))
+    return {
+        key: (side, side, side + slit)
+        for key, side in sides.items()
+        if side is not None and abs(getattr(chamber, key, math.inf) - side) < SAME_MM
+    }
+
+
 def setting_tables(result: Result, built: AsBuilt) -> list[Table]:
     """Return tables on the part, the chamber, its settings and the figures to expect.
 
@@ -258,7 +302,7 @@ def setting_tables(result: Result, built: AsBuilt) -> list[Table]:
         ("Shot", _shot(result)),
         ("Steps", _steps(result)),
         ("Made with", _identity(result)),
-        ("Peening, and what to expect", _expected(result)),
+        ("Peening, and what to expect", _expected(result, built.usual)),
     ])  # fmt: skip
 
 
@@ -359,8 +403,8 @@ def _chamber(result: Result, built: AsBuilt) -> Iterator[Row]:
     holder = result.design.holder
     in_bore = holder is not None and holder.clearance_mm > 0.0
     places = "round the part as above, of all other joints" if in_bore else "of joints and openings"
-    slit = f"round the sonotrode at most {plain(WIDEST_GAP * ball, 2)} mm"
-    yield "gaps", f"{places} at most {plain(tight_gap_mm(ball))} mm, or sealed; {slit}"
+    slit = f"round the sonotrode {slit_in_words(ball)}"
+    yield "gaps", f"{places} {joint_in_words(ball)}, or sealed; {slit}"
     if volume := result.record.chamber.volume_mm3:
         yield "free volume", f"{plain(1e-3 * volume)} cm³"
 
@@ -492,9 +536,15 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
         alike = ", driven alike: simulated as one face" if face.count > 1 else ""
         yield "stands on", f"{face.in_words}{alike}"
     yield "face in the chamber", _size(face_mm)
+    if limits := slit_limits(result):
+        sides = [
+            f"{in_words(key)} {plain(low)} mm and the slit on both sides, {plain(high)} mm at most"
+            for key, (low, _, high) in limits.items()
+        ]
+        yield "wall round the face", "; ".join(sides)
     if face is not None and face.count > 1:
-        gap = plain(1e3 * WIDEST_GAP * min(design.ball_diameters), 3)
-        yield "gaps between the blocks", f"below {gap} mm, half a ball"
+        gap = slit_in_words(1e3 * min(design.ball_diameters))
+        yield "gaps between the blocks", f"{gap}, half a ball"
     yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"
     yield "amplitude", amplitude_text(design.sonotrode)
     yield "peak speed of the face", f"{plain(design.sonotrode.peak_speed, 3)} m/s"
@@ -548,7 +598,7 @@ def _steps(result: Result) -> Iterator[Row]:
     yield from (("", one.text) for one in answer_lines(result) if one.about == "step")
 
 
-def _expected(result: Result) -> Iterator[Row]:
+def _expected(result: Result, usual: WantedIntensity | None) -> Iterator[Row]:
     """Yield rows (name, text) with the peening time and the expected coverage etc.
 
     Without a calibration, a row says why there is no intensity in mmA.
@@ -564,6 +614,12 @@ def _expected(result: Result) -> Iterator[Row]:
     if slow := time_at_slow_end(result):
         yield f"{metric_label(TIME).text}, at the slow end", slow
     wanted = result.design.process.intensity_mmA
+    if wanted is None and usual is not None:
+        rough = PredictedIntensity.of(result.metrics, calibration)
+        if rough is not None and "almen_intensity" not in result.metrics:
+            near = f"about {plain(rough.value, 2)} mmA, within a factor of {plain(rough.factor, 2)}"
+            yield "Almen intensity, roughly", near
+        yield "Almen intensity, usual", f"{_range_text(usual)}, {usual.text}"
     if wanted is None and (reason := why_no_intensity(calibration)):
         yield "", f"{reason[0].upper()}{reason[1:]}."
     for one in answer_lines(result, load_start(result)):

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.chamber.checks.openings import find_openings
 from chamberopt.chamber.checks.strips import strip_of_target
+from chamberopt.chamber.checks.usual import usual_for_target
 from chamberopt.chamber.fixture import plugs_of
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, write_bytes
@@ -26,6 +27,7 @@ from chamberopt.documents.sheet import (
     chamber_limits,
     drawn_openings,
     process_sheet,
+    slit_limits,
 )
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
 from chamberopt.pictures.charts.figure_style import ignore_settings_here
@@ -261,10 +263,15 @@ def write_sheet(
     with claim_file(path):
         chamber = load_chamber(loaded)
         design, part = loaded.design, chamber.part
-        of_part = find_openings(chamber), strip_of_target(design, part), plugs_of(design, part)
-        built = AsBuilt(face_size_mm(chamber), *of_part)
+        built = AsBuilt(
+            face_size_mm(chamber),
+            find_openings(chamber),
+            strip_of_target(design, part),
+            plugs_of(design, part),
+            usual_for_target(design, part),
+        )
         sheet = process_sheet(loaded, built, revision)
-        limits, face = chamber_limits(loaded), design.sonotrode.face
+        limits, face = slit_limits(loaded) | chamber_limits(loaded), design.sonotrode.face
         pages = draw_sheet(sheet, chamber, limits, face, drawn_openings(built))
         _save(path, pages, sheet.name)
     return path, sheet

@@ -192,7 +192,8 @@ def pose_in_words(mesh: PartMesh, known: Sequence[Surface], turns: Turns) -> str
             if length > FLAT * np.linalg.norm(vectors, axis=1).sum():
                 down = float(np.clip(-whole @ up / length, -1.0, 1.0))
                 tilts[one.name] = float(np.degrees(np.arccos(down)))
-    words = [f"the file's {down} down"] if (down := axis_down(turns)) else []
+    axis = axis_down(turns)
+    words = [f"the file's {axis} down"] if axis else []
     level = [f"{name} level facing down" for name, tilt in tilts.items() if tilt < LEVEL_DEG]
     level += [f"{name} level facing up" for name, tilt in tilts.items() if tilt > 180.0 - LEVEL_DEG]
     words += level[:1]
@@ -205,7 +206,7 @@ def pose_in_words(mesh: PartMesh, known: Sequence[Surface], turns: Turns) -> str
     return ", ".join(words)
 
 
-def axis_down(turns: Sequence[float]) -> str:
+def axis_down(turns: Turns) -> str:
     """Return which axis of the part's file points down, as "+x"; "" if none does.
 
     Args:

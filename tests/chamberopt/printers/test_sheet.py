@@ -20,6 +20,9 @@ from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text
+from chamberopt.design.almen_strip import USUAL_K
+from chamberopt.design.fixture import LEAST_GAP_MM, joint_in_words, slit_mm, tight_gap_mm
+from chamberopt.design.intensity import WantedIntensity
 from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.design.sonotrode import Face
 from chamberopt.documents.coverage import figures
@@ -34,6 +37,7 @@ from chamberopt.documents.sheet import (
     limit_tables,
     process_sheet,
     setting_tables,
+    slit_limits,
     title_block,
 )
 from chamberopt.documents.wording import metric_label, plain
@@ -166,6 +170,53 @@ def test_what_a_shop_needs_of_pose_target_strip_and_flanges(folder: Path) -> Non
         held = replace(result, record=record, design=result.design.changed({"holder": holder}))
         told = rows_of(held)["Chamber"]["holder"]
         assert f"54 mm long, with {ends} of the part, Ø 61.5 × 2 mm" in told
+
+
+def test_the_slit_round_the_sonotrode_is_in_the_dimensions(folder: Path) -> None:
+    """The wall goes round a face as wide as the floor, and stands on a larger one."""
+    result = load_result(folder)
+    for face, want in (({"diameter_mm": 50.0}, "Ø 50 +3/0"), ({"diameter_mm": 60.0}, "Ø 50")):
+        design = result.design.changed({"sonotrode.face": face})
+        limits = slit_limits(replace(result, design=design))
+        axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
+        draw_chamber(axes, build_chamber(design), 0.0, 100.0, (180.0, 100.0), limits)
+        assert want in [one.get_text() for one in axes.texts]
+        told = rows_of(replace(result, design=design))["Sonotrode"].get("wall round the face")
+        is_round = "diameter 50 mm and the slit on both sides, 53 mm at most"
+        assert told == (is_round if want.endswith("/0") else None)
+    assert slit_limits(result) == {}
+
+
+def test_an_intensity_off_the_usual_one_is_told_in_red(folder: Path) -> None:
+    usual = WantedIntensity(0.2, 0.3, "usual for steel")
+    built = AsBuilt((50.0,), usual=usual)
+    for value, want in ((0.1, "below"), (0.24, ""), (0.5, "above")):
+        found = load_result(folder)
+        found.metrics["strength_um"] = Estimate(1e3 * value / USUAL_K, 0.01)
+        sheet = process_sheet(found, built).sections[0].content
+        red = [one.text for one in sheet if isinstance(one, Sentence) and one.kind == "warning"]
+        off = [one for one in red if "expected Almen intensity" in one]
+        assert len(off) == bool(want)
+        assert all(f"{value} mmA, is {want} 0.2 to 0.3 mmA, usual for steel" in one for one in off)
+        (table,) = (one for one in sheet if isinstance(one, Table) and "expect" in one.caption)
+        assert ("Almen intensity, usual", "0.2 to 0.3 mmA, usual for steel") in table.rows
+        asked = replace(found, design=found.design.changed({"process.intensity_mmA": (0.1, 0.2)}))
+        asked.metrics.update(found.metrics)
+        sheet = process_sheet(asked, built).sections[0].content
+        assert not [x for x in sheet if isinstance(x, Sentence) and "expected Almen" in x.text]
+
+
+def test_joints_are_as_tight_on_the_sheet_as_the_proposal_has_them(folder: Path) -> None:
+    """By the geometry of fixture.py: in a tight gap a ball sinks by a hundredth of its radius."""
+    result = load_result(folder)
+    for ball in (0.4, 1.588, 3.0):
+        gap = tight_gap_mm(ball)
+        sinks = 0.5 * (ball - math.sqrt(ball**2 - gap**2))
+        assert sinks <= 0.01 * 0.5 * ball or gap == LEAST_GAP_MM
+        assert slit_mm(ball) == pytest.approx(0.5 * ball, abs=0.01)
+        design = result.design.changed({"shot.diameter_mm": ball, "shot.mass_g": 1.0})
+        told = rows_of(replace(result, design=design))["Chamber"]["gaps"]
+        assert f"openings {joint_in_words(ball)}, or sealed" in told
 
 
 def sides(*corners: tuple[float, float]) -> np.ndarray:

@@ -7,8 +7,10 @@ import pytest
 import trimesh
 
 from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.checks.facts import _fixture_facts
 from chamberopt.chamber.checks.strips import StripOfTarget, strip_of_target
 from chamberopt.chamber.fixture import plugs_in_words, plugs_of
+from chamberopt.documents.facts import _texts
 from tests.chamberopt.chamber.checks.test_openings import design_of, drilled
 
 DOWN = {"direction": (0, 0, -1), "angle_deg": (0, 30)}
@@ -34,7 +36,8 @@ def test_a_target_that_is_whole_is_no_strip(tmp_path: Path) -> None:
     plate = trimesh.creation.box((40, 20, 6))
     wide = {"box_mm": ((-30, -20, -10), (30, 20, 10)), "cut": True}
     corner = {"box_mm": ((-30, -20, -10), (5, 5, 10)), "cut": True}
-    for box in ({}, wide, corner, {**wide, "box_mm": ((-10, -20, -10), (10, 20, 10)), "cut": False}):
+    uncut = {"box_mm": ((-10, -20, -10), (10, 20, 10)), "cut": False}
+    for box in ({}, wide, corner, uncut):
         design = design_of(tmp_path, plate, target={**DOWN, **box})
         assert strip_of_target(design, build_chamber(design).part) is None
     assert StripOfTarget(0, 4.9, 5.1, 0.0, 10.0).settings == 1 + 2 * 25
@@ -53,3 +56,18 @@ def test_plugs_of_several_holes(tmp_path: Path) -> None:
         assert plugs_in_words(plugs_of(design, build_chamber(design).part)) == want
     design = design_of(tmp_path, plate)
     assert plugs_of(design, build_chamber(design).part) == []
+
+
+def test_check_tells_the_holes_of_plugs_and_no_length(tmp_path: Path) -> None:
+    plate = trimesh.creation.box((50, 30, 6))
+    for x, radius in ((-15, 4.0), (0, 2.5), (15, 2.5)):
+        plate = drilled(plate, radius, (x, 0, 0), 2)
+    walls = [{"at_mm": (x + radius, 0.0, 0.0)} for x, radius in ((-15, 4.0), (0, 2.5), (15, 2.5))]
+    design = design_of(tmp_path, plate, {"faces": walls})
+    mask = _fixture_facts(design, build_chamber(design))["mask"]
+    assert (mask["kind"], mask["holes"]) == ("plugs", 3)
+    assert mask["hole_diameters_mm"] == pytest.approx([8.0, 5.0], rel=1e-3)
+    assert mask["hole_depths_mm"] == pytest.approx([6.0, 6.0])
+    told = ", ".join(_texts(mask))
+    assert "holes 3, hole diameters (8, 5) mm, hole depths (6, 6) mm" in told
+    assert "length" not in told
