@@ -329,9 +329,9 @@ def _part(result: Result, strip: StripOfTarget | None) -> Iterator[Row]:
     if result.design.chamber.shape == "imported":
         yield "pose", "as drawn with its chamber"
     else:
-        yield "turned", turned(part.rotate_deg) or "as in its file"
-        if down := axis_down(part.rotate_deg):
-            yield "down", f"the {down} of its file".replace("-", "−")
+        down = axis_down(part.rotate_deg).replace("-", "−")
+        pose = [turned(part.rotate_deg) or "as in its file", f"{down} down" if down else ""]
+        yield "turned", ": ".join(filter(None, pose))
         x, y = part.offset_mm
         yield "offset from the axis", f"x {plain(x)} mm, y {plain(y)} mm" if x or y else "none"
         text = f"{plain(result.design.chamber.sonotrode_distance_mm)} mm"

@@ -107,7 +107,9 @@ WIDER = 0.1  # mm: a cavity that is wider than its sonotrode by more has its own
 # mm on paper, lower left and upper right of what is round a plan without words and dimensions
 FREE = (-8.0, -8.0), (8.0, 2.0)
 FACE = 2.5  # mm on paper, thickness of the drawn sonotrode
-MOST_OUTSIDE = 6.0  # mm on paper, most of the part that is drawn outside the chamber
+MOST_OUTSIDE = 15.0  # mm on paper, most of the part that is drawn outside the chamber
+BREAK, WAVE = 0.5, 3.0  # mm, height and length of the waves of a line where the part is broken off
+OFF_AXIS = 0.05  # mm: a section that is farther beside the axis has its place dimensioned
 ROOM, PART, TARGET = "#e8f1f7", "#c9ced3", KINDS["target"].colour
 RASTER = 200  # dots an inch, for the part in the plan
 LEGEND = (
@@ -266,6 +268,7 @@ def _draw_section(
     window = view.window(axes)
     _fill(axes, view, lines, window, facecolor=ROOM, lw=0.0)
     _fill(axes, view, own, window, facecolor=PART, edgecolor=DARK_GREY, hatch="////", lw=0.5)
+    _draw_breaks(axes, view, own)
     tags, target = chamber.tags[row], chamber.on_target[row]
     _lines(axes, view, lines[tags == TAG_WALL], BLACK, 1.1)
     _lines(axes, view, lines[tags > TAG_WALL], SONOTRODE, 2.5)
@@ -302,6 +305,28 @@ def _draw_section(
     dimension(axes, (left, y), (left, low_at), 4.5, text, upright=True)
     text = _with_limits(plain(view.high[1]), float(view.high[1]), limits, "height_mm")
     dimension(axes, (right, y), (right, top), -4.5, text, upright=True)
+
+
+def _draw_breaks(axes: Axes, view: View, lines: np.ndarray) -> None:
+    """Draw a wave wherever a part is broken off, as it goes on beyond what is drawn of it.
+
+    Args:
+        lines: lines of the part's section, (k, 2, 2) [m].
+    """
+    sides, above = view.outside
+    low, high = view.place([view.low, view.high])
+    ends = view.place(1e3 * lines)
+    for axis, edge in ((0, low[0] - sides), (0, high[0] + sides), (1, high[1] + above)):
+        one, two = ends[:, 0], ends[:, 1]
+        crossing = (one[:, axis] > edge) != (two[:, axis] > edge)
+        one, two = one[crossing], two[crossing]
+        share = (edge - one[:, axis]) / (two - one)[:, axis]
+        places = np.sort((one + share[:, None] * (two - one))[:, 1 - axis])
+        for start, end in places[: len(places) // 2 * 2].reshape(-1, 2):
+            along = np.linspace(start, end, max(9, int(8.0 * (end - start) / WAVE)))
+            wave = edge + BREAK * np.sin(2.0 * np.pi * (along - start) / WAVE)
+            x, y = (wave, along) if axis == 0 else (along, wave)
+            axes.plot(x, y, color=BLACK, lw=0.6)
 
 
 def _draw_fixtures(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
@@ -351,10 +376,17 @@ def _draw_plan(
     is_upright = False
     for name, plane in zip("AB", planes, strict=False):
         at_x, at_y = view.place([plane.at, plane.at])
+        beside = plain(round(abs(plane.at), 1)) if abs(plane.at) > OFF_AXIS else ""
         if plane.right == 0:
             across_line(axes, (left - 3.0, at_y), (right + 3.0, at_y), name=name)
+            ends = (left, min(y, at_y)), (left, max(y, at_y))
+            if beside:
+                dimension(axes, *ends, 8.5, beside, upright=True)
         else:
             across_line(axes, (at_x, bottom - 3.0), (at_x, top + 3.0), name=name)
+            ends = (min(x, at_x), top), (max(x, at_x), top)
+            if beside:
+                dimension(axes, *ends, -3.5, beside)
             is_upright = True
     if len(planes) == 1:  # the other axis, and the length that the section does not show
         across = planes[0].right

@@ -305,7 +305,9 @@ def draw_sheet(
     top = _heading(axes, first.title, sheet, red)
     settings = [one for one in content if isinstance(one, Table) and not one.head]
     texts = (whole, settings, top - FOOT)
-    _, _, _, room = _laid_out(*texts, [DRAWING_PER_PT * size for size in SIZES])
+    shown, _, _, room = _laid_out(*texts, [DRAWING_PER_PT * size for size in SIZES])
+    if shown is settings:  # with somewhat smaller letters the drawing may have a larger scale
+        room = max(room, top - FOOT + _content(Writer(None, LEAST_ALONE), settings, 0.0))
     # A drawing of that scale is lower than its room: with less room the letters may be larger.
     tall = drawing_height(chamber, (INNER, min(MOST_DRAWING, room) - CAPTION))
     shown, size, most, _ = _laid_out(*texts, [CAPTION + tall] * len(SIZES))
