@@ -115,7 +115,7 @@ class Selection(FileTable):
             several = "one face" if count == 1 else f"{count} faces"
             place = ", ".join(plain(round(x, 1) + 0.0) for x in self.faces[0].at_mm)
             alike = ", with all faces alike" if any(one.alike for one in self.faces) else ""
-            first = "" if count == 1 else "one of them "
+            first = "" if count == 1 else "such as "
             words.append(f"{several}, {first}at ({place}) mm of its file{alike}")
         if self.direction is not None and self.angle_deg is not None:
             low, high = map(plain, self.angle_deg)

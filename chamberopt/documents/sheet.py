@@ -538,7 +538,7 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     yield "face in the chamber", _size(face_mm)
     if limits := slit_limits(result):
         sides = [
-            f"{in_words(key)} {plain(low)} mm and the slit on both sides, {plain(high)} mm at most"
+            f"{in_words(key)} {plain(low)} mm and a slit at both sides, at most {plain(high)} mm"
             for key, (low, _, high) in limits.items()
         ]
         yield "wall round the face", "; ".join(sides)

@@ -155,7 +155,7 @@ def test_what_a_shop_needs_of_pose_target_strip_and_flanges(folder: Path) -> Non
     named = result.design.changed({"part.target": {"surface": "root", "faces": faces}})
     rows = rows_of(replace(result, design=named))["Part and pose"]
     assert rows["target, chosen by"] == (
-        "the surface root of its file; 2 faces, one of them at (1, 2.2, 0) mm of its file, with "
+        "the surface root of its file; 2 faces, such as at (1, 2.2, 0) mm of its file, with "
         "all faces alike"
     )
     strip = StripOfTarget(1, 0.0664, 0.1288, 0.004, 0.316)
@@ -186,7 +186,7 @@ def test_the_slit_round_the_sonotrode_is_in_the_dimensions(folder: Path) -> None
         draw_chamber(axes, build_chamber(design), 0.0, 100.0, (180.0, 100.0), limits)
         assert want in [one.get_text() for one in axes.texts]
         told = rows_of(replace(result, design=design))["Sonotrode"].get("wall round the face")
-        is_round = "diameter 50 mm and the slit on both sides, 53 mm at most"
+        is_round = "diameter 50 mm and a slit at both sides, at most 53 mm"
         assert told == (is_round if want.endswith("/0") else None)
     assert slit_limits(result) == {}
 
