@@ -32,7 +32,7 @@ from chamberopt.chamber.bores_and_deflectors import (
     swept_faces,
     triangle_properties,
 )
-from chamberopt.chamber.part import chosen_on_part, turning_axis
+from chamberopt.chamber.part import chosen_on_part, chosen_triangles, turning_axis
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import typeset_plain
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, lofted
@@ -525,6 +525,51 @@ def _plugs(part: Part, chosen: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]
         hull = trimesh.convex.convex_hull(vertices - _offsets(vertices, triangles, SINK))
         plugs.append((np.asarray(hull.vertices), np.asarray(hull.faces)))
     return plugs
+
+
+class Plug(NamedTuple):
+    """A plug that fills a hole of the part from rim to rim."""
+
+    diameter: float  # of the narrowest circle about its axis round it [m]
+    depth: float  # from rim to rim, along its axis [m]
+
+
+def plugs_of(design: Design, part: Part) -> list[Plug]:
+    """Return the plugs of a design's mask, the widest first.
+
+    There are none where the mask is none of plugs, or is on surfaces that the part's file names,
+    of which a result keeps no names.
+    """
+    mask, file = design.mask, part.file
+    if mask is None or not mask.plugs or mask.at.surface != ("all",) or file is None:
+        return []
+    mesh = file.simulated if file.original is None else file.original
+    plugs = []
+    for piece in pieces_of(mesh.triangles, chosen_triangles(mesh, mask.at, "mask.at")):
+        walls = mesh.triangles[piece]
+        vectors = area_vectors(mesh.vertices, walls)
+        normals = unit_vectors(vectors)
+        # No wall of a hole looks along its axis.
+        spread = (normals * np.linalg.norm(vectors, axis=1)[:, None]).T @ normals
+        frame = frame_along(np.linalg.eigh(spread)[1][:, 0])
+        places = mesh.vertices[np.unique(walls)] @ frame.T
+        hull = convex_hull(places[:, :2])
+        if hull is not None:
+            radius = radii(hull, fitted_circle(hull)[0])[1]
+            plugs.append(Plug(2.0 * float(radius), float(np.ptp(places[:, 2]))))
+    return sorted(plugs, reverse=True)
+
+
+def plugs_in_words(plugs: Sequence[Plug]) -> str:
+    """Return number and sizes of plugs as text, such as "in 2 holes of Ø 40 × 3 mm"."""
+    sizes = [
+        f"Ø {typeset_plain(round(1e3 * one.diameter, 1))} × "
+        f"{typeset_plain(round(1e3 * one.depth, 1))} mm"
+        for one in plugs
+    ]
+    several = ((sizes.count(one), one) for one in dict.fromkeys(sizes))
+    text = ", ".join(f"{count} hole{'s' if count > 1 else ''} of {one}" for count, one in several)
+    return f"in {text} deep"
 
 
 def pieces_of(triangles: np.ndarray, chosen: np.ndarray) -> list[np.ndarray]:

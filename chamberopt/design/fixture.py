@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from chamberopt.common import toml_fields
+from chamberopt.common.number_text import plain
 from chamberopt.common.toml_errors import Problem
 from chamberopt.common.toml_fields import Direction, Pair, list_field, quantity
 from chamberopt.design.part import Selection
@@ -25,6 +26,21 @@ USUAL_SHELL_MM = 1.0
 def tight_gap_mm(ball_mm: float) -> float:
     """Return the widest gap [mm] of a joint that counts as none for balls of a diameter [mm]."""
     return max(math.floor(100.0 * TIGHT_GAP * ball_mm) / 100.0, LEAST_GAP_MM)
+
+
+def joint_in_words(ball_mm: float) -> str:
+    """Return how wide the gap of a joint may be, also round a shaft in a wall, in words."""
+    return f"at most {plain(tight_gap_mm(ball_mm))} mm"
+
+
+def slit_in_words(ball_mm: float) -> str:
+    """Return how wide a gap beside a sonotrode may be, in words."""
+    return f"at most {plain(slit_mm(ball_mm))} mm"
+
+
+def slit_mm(ball_mm: float) -> float:
+    """Return the widest gap [mm] beside a sonotrode, which may touch nothing, for such balls."""
+    return math.floor(100.0 * WIDEST_GAP * ball_mm + 1e-9) / 100.0
 
 
 # The keys that each kind of holder may have beside `axis`.

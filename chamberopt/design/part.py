@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BeforeValidator, Field
 
+from chamberopt.common.number_text import plain
 from chamberopt.common.toml_errors import CrossCheckError, Problem
 from chamberopt.common.toml_fields import (
     MeshFile,
@@ -103,6 +104,31 @@ class Selection(FileTable):
             corners = [list(corner) for corner in self.box_mm]
             text = f"given {corners}; each low corner must be below its high corner"
             yield Problem("box_mm", text)
+
+    @property
+    def in_words(self) -> str:
+        """What is chosen, by the keys that are given, such as "the surface root of its file"."""
+        named = self.surface != ("all",)
+        words = [f"the surface {' and '.join(self.surface)} of its file"] if named else []
+        if self.faces:
+            count = len(self.faces)
+            several = "one face" if count == 1 else f"{count} faces"
+            place = ", ".join(plain(round(x, 1) + 0.0) for x in self.faces[0].at_mm)
+            alike = ", with all faces alike" if any(one.alike for one in self.faces) else ""
+            first = "" if count == 1 else "such as "
+            words.append(f"{several}, {first}at ({place}) mm of its file{alike}")
+        if self.direction is not None and self.angle_deg is not None:
+            low, high = map(plain, self.angle_deg)
+            way = ", ".join(map(plain, self.direction))
+            words.append(f"what looks {low} to {high}° away from ({way}) of its file")
+        if self.box_mm is not None:
+            sides = zip("xyz", *self.box_mm, strict=True)
+            ends = ", ".join(f"{axis} {plain(a)} to {plain(b)}" for axis, a, b in sides)
+            words.append(f"within {ends} mm of its file")
+        if self.radius_mm is not None:
+            low, high = map(plain, self.radius_mm)
+            words.append(f"{low} to {high} mm from the z axis of its file")
+        return "; ".join(words)
 
 
 class Target(Selection):

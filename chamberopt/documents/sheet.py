@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.checks.openings import PLATE
 from chamberopt.chamber.checks.place_names import CEILING
-from chamberopt.chamber.fixture import size_in_words
+from chamberopt.chamber.fixture import plugs_in_words, size_in_words
+from chamberopt.chamber.propose.pose import axis_down
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.key_words import in_words, key_in_words, title_with_unit, unit_of
 from chamberopt.common.number_text import estimate_text, percent
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.calibration import why_no_intensity
-from chamberopt.design.fixture import WIDEST_GAP, tight_gap_mm
-from chamberopt.design.intensity import PredictedIntensity
+from chamberopt.design.fixture import joint_in_words, slit_in_words, slit_mm
+from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
 from chamberopt.design.materials import alloys, find
 from chamberopt.design.tolerances import USUAL, USUAL_IN_WORDS, tolerance_box
 from chamberopt.documents.answer import answer, answer_lines
@@ -33,6 +36,9 @@ from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
     from chamberopt.chamber.checks.openings import Opening
+    from chamberopt.chamber.checks.strips import StripOfTarget
+    from chamberopt.chamber.fixture import Plug
+    from chamberopt.design.fixture import Holder
     from chamberopt.design.shot import ShotTable
     from chamberopt.design.sonotrode import VibratingFace
     from chamberopt.documents.coverage import Figure
@@ -45,6 +51,7 @@ TIME = "time_to_98_s"
 WIDEST_FACE = 90.0  # mm: larger faces need slots or are several (chamber/usual_shop.toml)
 SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wall is named by it
 EDGE, CLAMPED = 5e-5, 3e-3  # m: narrower openings are none; jaws take what stands out so far
+SAME_MM = 0.02  # lengths that differ by less count as equal
 JAMMED = 0.01  # least share of the shot's time, or of the impacts, in gaps that is told in red
 
 
@@ -98,6 +105,24 @@ def _wide_face(result: Result, face_mm: tuple[float, ...]) -> Iterator[str]:
             "one that moves alike all over. If yours is smaller, set several side by side or peen "
             "a strip at a time; if it has slots, measure its amplitude over the face."
         )
+
+
+def _unusual_intensity(result: Result, usual: WantedIntensity | None) -> Iterator[str]:
+    """Yield a sentence if an intensity that nobody asked for is expected off the usual range."""
+    design = result.design
+    found = PredictedIntensity.of(result.metrics, design.calibration)
+    if usual is None or found is None or design.process.intensity_mmA is not None:
+        return
+    if off := usual.off(found.value):
+        yield (
+            f"The expected Almen intensity, {plain(found.value, 2)} mmA, is "
+            f"{'below' if off < 0.0 else 'above'} {_range_text(usual)}, {usual.text}: agree on it, "
+            "or ask for another one (process.intensity_mmA)."
+        )
+
+
+def _range_text(usual: WantedIntensity) -> str:
+    return f"{plain(usual.low)} to {plain(usual.high)} mmA"
 
 
 def _size(face_mm: tuple[float, ...]) -> str:
@@ -177,6 +202,9 @@ class AsBuilt(NamedTuple):
 
     face_mm: tuple[float, ...]  # of the sonotrode: a diameter, or two sides
     openings: Sequence[Opening] = ()  # through which the part goes out
+    strip: StripOfTarget | None = None  # if the target is peened a strip at a time
+    plugs: Sequence[Plug] = ()  # of the mask
+    usual: WantedIntensity | None = None  # Almen intensity of its metal and thickness
 
 
 def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Document:
@@ -191,9 +219,12 @@ def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Documen
     record = result.record
     start = load_start(result)
     checks, calibrated = first_checks(result), calibrated_to(result)
-    red = [
-        Sentence(text, "warning") for text in (*alarms(result), *_wide_face(result, built.face_mm))
-    ]
+    reasons = (
+        *alarms(result),
+        *_unusual_intensity(result, built.usual),
+        *_wide_face(result, built.face_mm),
+    )
+    red = [Sentence(text, "warning") for text in reasons]
     requalify = Sentence(REQUALIFY)
     content: list[Block] = [*red, *setting_tables(result, built), checks, *calibrated, requalify]
     name = f"{result.design.part.mesh_path.name}: {result.folder.resolve().name}"
@@ -239,19 +270,39 @@ def chamber_limits(result: Result) -> dict[str, tuple[float, float, float]]:
     }
 
 
+def slit_limits(result: Result) -> dict[str, tuple[float, float, float]]:
+    """Return value, least and largest value of each key of [chamber] as wide as the sonotrode.
+
+    A wall round the sonotrode's face stands beside it by a slit, which is not simulated.
+    """
+    face, chamber = result.design.sonotrode.face, result.design.chamber
+    if face is None:
+        return {}
+    long, wide = face.sides_mm
+    sides = {"diameter_mm": face.diameter_mm}
+    if face.diameter_mm is None:
+        sides = {"length_mm": long, "width_mm": wide}
+    slit = 2.0 * slit_mm(1e3 * min(result.design.ball_diameters))
+    return {
+        key: (side, side, side + slit)
+        for key, side in sides.items()
+        if side is not None and abs(getattr(chamber, key, math.inf) - side) < SAME_MM
+    }
+
+
 def setting_tables(result: Result, built: AsBuilt) -> list[Table]:
     """Return tables on the part, the chamber, its settings and the figures to expect.
 
     A row with an empty name holds a sentence.
     """
     return _tables([
-        ("Part and pose", _part(result)),
-        ("Chamber", _chamber(result, built.openings)),
+        ("Part and pose", _part(result, built.strip)),
+        ("Chamber", _chamber(result, built)),
         ("Sonotrode", _sonotrode(result, built.face_mm)),
         ("Shot", _shot(result)),
         ("Steps", _steps(result)),
         ("Made with", _identity(result)),
-        ("Peening, and what to expect", _expected(result)),
+        ("Peening, and what to expect", _expected(result, built.usual)),
     ])  # fmt: skip
 
 
@@ -271,14 +322,16 @@ def _tables(found: Sequence[tuple[str, Iterator[Row]]]) -> list[Table]:
     return [one for one in tables if one.rows]
 
 
-def _part(result: Result) -> Iterator[Row]:
+def _part(result: Result, strip: StripOfTarget | None) -> Iterator[Row]:
     part, turn = result.design.part, result.design.effects.part_turn
     yield "part", part.mesh_path.name
     yield "metal", _metal(result)
     if result.design.chamber.shape == "imported":
         yield "pose", "as drawn with its chamber"
     else:
-        yield "turned", turned(part.rotate_deg) or "as in its file"
+        down = axis_down(part.rotate_deg).replace("-", "−")
+        pose = [turned(part.rotate_deg) or "as in its file", f"{down} down" if down else ""]
+        yield "turned", ": ".join(filter(None, pose))
         x, y = part.offset_mm
         yield "offset from the axis", f"x {plain(x)} mm, y {plain(y)} mm" if x or y else "none"
         text = f"{plain(result.design.chamber.sonotrode_distance_mm)} mm"
@@ -292,6 +345,25 @@ def _part(result: Result) -> Iterator[Row]:
         yield "turns", f"{speed} about the file's axis ({axis})"
     if area := exposed_target(result):
         yield "target", area
+    # A strip is told in a row of its own.
+    chosen = part.target.model_copy(update={} if strip is None else {"box_mm": None})
+    if words := chosen.in_words:
+        yield "target, chosen by", words
+    if strip is not None:
+        yield "a strip at a time", _of_strip(strip)
+
+
+def _of_strip(strip: StripOfTarget) -> str:
+    """Return in words which strip of the target is peened, and how the part moves for the next."""
+    low, high, length = (
+        plain(round(1e3 * x, 1) + 0.0) for x in (strip.low, strip.high, strip.high - strip.low)
+    )
+    axis = "xyz"[strip.axis]
+    return (
+        f"setting {strip.before + 1} of {strip.settings}: {axis} {low} to {high} mm of its file; "
+        f"the part is moved by {length} mm along that {axis} from one to the next, and each takes "
+        "the peening time"
+    )
 
 
 def _metal(result: Result) -> str:
@@ -311,7 +383,7 @@ def _limited(result: Result, name: str, text: str) -> str:
     return text if ends is None else f"{text} ({' to '.join(map(plain, ends))})"
 
 
-def _chamber(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
+def _chamber(result: Result, built: AsBuilt) -> Iterator[Row]:
     table = result.design.chamber.model_dump(mode="json", exclude_none=True)
     yield "shape", PurePath(table.pop("shape")).name
     for key in ("sonotrode_distance_mm", "facets", "mesh", "unit"):
@@ -326,20 +398,20 @@ def _chamber(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
     for what, several in counted.items():
         if several:
             yield what, f"{len(several)}: see the report"
-    yield from _fixtures(result, openings)
+    yield from _fixtures(result, built)
     ball = 1e3 * min(result.design.ball_diameters)
     holder = result.design.holder
     in_bore = holder is not None and holder.clearance_mm > 0.0
     places = "round the part as above, of all other joints" if in_bore else "of joints and openings"
-    slit = f"round the sonotrode at most {plain(WIDEST_GAP * ball, 2)} mm"
-    yield "gaps", f"{places} at most {plain(tight_gap_mm(ball))} mm, or sealed; {slit}"
+    slit = f"round the sonotrode {slit_in_words(ball)}"
+    yield "gaps", f"{places} {joint_in_words(ball)}, or sealed; {slit}"
     if volume := result.record.chamber.volume_mm3:
         yield "free volume", f"{plain(1e-3 * volume)} cm³"
 
 
-def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
+def _fixtures(result: Result, built: AsBuilt) -> Iterator[Row]:
     """Yield rows on what holds the part, where it goes out, and what masks it."""
-    holder = result.design.holder
+    holder, openings = result.design.holder, built.openings
     if holder is not None and holder.kind == "bore":
         play = "tight"
         if holder.clearance_mm:
@@ -352,17 +424,18 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
         yield "holder", f"none: {out}{'' if padded else '; clamp it there'}"
     rows = []
     for number, way in enumerate(openings):
-        place = ", ".join(plain(round(1e3 * x, 1) + 0.0) for x in way.place)
         frame = "" if number else " in the chamber's frame"
         rows.append(
-            ("opening", f"{_of_opening(way)} round ({place}) mm{frame}; {_beyond(way, openings)}")
+            ("opening", f"{_of_opening(way)} at {_place(way)} mm{frame}; {_beyond(way, openings)}")
         )
     yield from _first(rows, "openings")
     faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
     for name, one in result.record.chamber.fixtures.items():
         size = size_in_words(one.kind, one.size_mm)
-        flush = "flush with their rims" if one.kind == "plugs" else "up to the wall"
-        text = f"{one.kind} {size or flush}"
+        if one.kind == "plugs":
+            sizes = f"{plugs_in_words(built.plugs)}, " if built.plugs else ""
+            size = f"{sizes}flush with their rims"
+        text = f"{one.kind} {size or 'up to the wall'}"
         if one.length_mm:
             text += f", {plain(one.length_mm)} mm long"
         if one.place_mm and holder is not None:
@@ -371,20 +444,65 @@ def _fixtures(result: Result, openings: Sequence[Opening]) -> Iterator[Row]:
                 for three in (one.place_mm, holder.axis)
             )
             text += f", from ({at}) mm along ({along}) in the chamber's frame"
+        if holder is not None and name == "holder":
+            text += _flanges(holder)
         chosen = faces[name]
         where = f" ({', '.join(chosen.surface)})" if chosen and chosen.surface != ("all",) else ""
         yield name, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part{where}"
 
 
+def _flanges(holder: Holder) -> str:
+    """Return in words the flanges of an arbor, which mask the part's ends; "" without any."""
+    if holder.kind != "arbor" or holder.diameter_mm is None or holder.thickness_mm is None:
+        return ""
+    ends = "flanges at both ends" if holder.both_sides else "a flange at the end"
+    over = f", {plain(holder.grip_mm)} mm over it as a cup" if holder.grip_mm else ""
+    size = f"Ø {plain(holder.diameter_mm)} × {plain(holder.thickness_mm)} mm"
+    return f", with {ends} of the part, {size}{over}"
+
+
 def _of_opening(one: Opening) -> str:
     """Return in words how large an opening is, and in which wall."""
     sides = [plain(round(1e3 * x, 1) + 0.0) for x in one.size]
-    ways = zip("xyz", one.way, strict=True)
-    at = next((f" at {'+−'[x < 0.0]}{axis}" for axis, x in ways if abs(x) > SQUARE), "")
-    wall = one.wall if one.wall == CEILING else f"{one.wall}{at}"
-    if min(one.size) < EDGE:
+    wall = _wall_of(one)
+    if one.form == "edge" or min(one.size) < EDGE:
         return f"{sides[int(np.argmax(one.size))]} mm of {wall}, which ends on the part,"
-    return f"{' × '.join(sides)} mm in {wall}"
+    if one.form == "round":
+        return f"round, Ø {plain(round(500.0 * sum(one.size), 1))} mm, in {wall}, its middle"
+    size = f"{' × '.join(sides)} mm"
+    if one.form == "other":
+        drawn = "" if one.outline is None else " (last page)"
+        section = f"along the part's section, within {size}, no rectangle{drawn}"
+        return f"{section}, in {wall}, its middle"
+    return f"{size} in {wall}, its middle"
+
+
+def _place(one: Opening) -> str:
+    """Return the middle of an opening [mm] as text."""
+    return f"({', '.join(plain(round(1e3 * x, 1) + 0.0) for x in one.place)})"
+
+
+def _wall_of(one: Opening) -> str:
+    """Return in words in which wall an opening is."""
+    level = np.hypot(*one.way[:2]) or 1.0  # walls may lean
+    ways = zip("xy", (float(x / level) for x in one.way[:2]), strict=True)
+    at = next((f" at {'+−'[x < 0.0]}{axis}" for axis, x in ways if abs(x) > SQUARE), "")
+    return one.wall if one.wall == CEILING else f"{one.wall}{at}"
+
+
+OUTLINES = (
+    "What the part fills of the wall, seen from outside, without clearance. Dashed: where it goes "
+    "on over an edge of the wall."
+)
+
+
+def drawn_openings(built: AsBuilt) -> list[tuple[str, Opening]]:
+    """Return the openings that are cut along the part's section, each with its place in words."""
+    return [
+        (f"{_wall_of(one)}, middle at\n{_place(one)} mm", one)
+        for one in built.openings
+        if one.form == "other" and one.outline is not None
+    ][:MOST_ROWS]
 
 
 def _beyond(one: Opening, openings: Sequence[Opening]) -> str:
@@ -393,7 +511,11 @@ def _beyond(one: Opening, openings: Sequence[Opening]) -> str:
         return "the part fills it"
     farthest = max(other.beyond for other in openings)
     clamp = ": clamp it there" if one.beyond >= min(CLAMPED, farthest) else ""
-    return f"the part stands out by {plain(1e3 * one.beyond, 2)} mm{clamp}"
+    wider = ""
+    if one.wider is not None:
+        size = " × ".join(plain(round(1e3 * x, 1)) for x in one.wider)
+        wider = f"; it widens to {size} mm in the first {plain(1e3 * PLATE)} mm outside"
+    return f"the part stands out by {plain(1e3 * one.beyond, 2)} mm{clamp}{wider}"
 
 
 def key_row(key: str, value: Any) -> Row:
@@ -414,9 +536,15 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
         alike = ", driven alike: simulated as one face" if face.count > 1 else ""
         yield "stands on", f"{face.in_words}{alike}"
     yield "face in the chamber", _size(face_mm)
+    if limits := slit_limits(result):
+        sides = [
+            f"{in_words(key)} {plain(low)} mm and a slit at both sides, at most {plain(high)} mm"
+            for key, (low, _, high) in limits.items()
+        ]
+        yield "wall round the face", "; ".join(sides)
     if face is not None and face.count > 1:
-        gap = plain(1e3 * WIDEST_GAP * min(design.ball_diameters), 3)
-        yield "gaps between the blocks", f"below {gap} mm, half a ball"
+        gap = slit_in_words(1e3 * min(design.ball_diameters))
+        yield "gaps between the blocks", f"{gap}, half a ball"
     yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"
     yield "amplitude", amplitude_text(design.sonotrode)
     yield "peak speed of the face", f"{plain(design.sonotrode.peak_speed, 3)} m/s"
@@ -470,7 +598,7 @@ def _steps(result: Result) -> Iterator[Row]:
     yield from (("", one.text) for one in answer_lines(result) if one.about == "step")
 
 
-def _expected(result: Result) -> Iterator[Row]:
+def _expected(result: Result, usual: WantedIntensity | None) -> Iterator[Row]:
     """Yield rows (name, text) with the peening time and the expected coverage etc.
 
     Without a calibration, a row says why there is no intensity in mmA.
@@ -486,6 +614,12 @@ def _expected(result: Result) -> Iterator[Row]:
     if slow := time_at_slow_end(result):
         yield f"{metric_label(TIME).text}, at the slow end", slow
     wanted = result.design.process.intensity_mmA
+    if wanted is None and usual is not None:
+        rough = PredictedIntensity.of(result.metrics, calibration)
+        if rough is not None and "almen_intensity" not in result.metrics:
+            near = f"about {plain(rough.value, 2)} mmA, within a factor of {plain(rough.factor, 2)}"
+            yield "Almen intensity, roughly", near
+        yield "Almen intensity, usual", f"{_range_text(usual)}, {usual.text}"
     if wanted is None and (reason := why_no_intensity(calibration)):
         yield "", f"{reason[0].upper()}{reason[1:]}."
     for one in answer_lines(result, load_start(result)):

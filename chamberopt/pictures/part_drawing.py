@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.checks.openings import Opening
     from chamberopt.design.sonotrode import Face
 
 # All lengths are in mm on the page.
@@ -106,7 +107,9 @@ WIDER = 0.1  # mm: a cavity that is wider than its sonotrode by more has its own
 # mm on paper, lower left and upper right of what is round a plan without words and dimensions
 FREE = (-8.0, -8.0), (8.0, 2.0)
 FACE = 2.5  # mm on paper, thickness of the drawn sonotrode
-MOST_OUTSIDE = 6.0  # mm on paper, most of the part that is drawn outside the chamber
+MOST_OUTSIDE = 15.0  # mm on paper, most of the part that is drawn outside the chamber
+BREAK, WAVE = 0.5, 3.0  # mm, height and length of the waves of a line where the part is broken off
+OFF_AXIS = 0.05  # mm: a section that is farther beside the axis has its place dimensioned
 ROOM, PART, TARGET = "#e8f1f7", "#c9ced3", KINDS["target"].colour
 RASTER = 200  # dots an inch, for the part in the plan
 LEGEND = (
@@ -191,7 +194,7 @@ def draw_chamber(
     view = View(0, scale, corner, low[:2], high[:2], np.zeros(2))
     _draw_plan(axes, chamber, view, planes, limits)
     dashed = [] if face is None else _draw_face(axes, chamber, view, face)
-    text = f"{plain(scale)}:1" if scale >= 1.0 else f"1:{plain(1.0 / scale)}"
+    text = _scale_in_words(scale)
     what = "Section A–A" if len(planes) == 1 else "Sections A–A and B–B"
     dashes = f", dashed: {' and '.join(dashed)}" if dashed else ""
     return f"{what} and plan, scale {text}{dashes}"
@@ -251,7 +254,7 @@ def _with_limits(text: str, length: float, limits: Limits, *keys: str) -> str:
             down, up = value - low, high - value
             if abs(up - down) < 1e-9 * value:
                 return f"{text} ±{plain(up)}"
-            return f"{text} +{plain(up)}/−{plain(down)}"
+            return f"{text} +{plain(up)}/{f'−{plain(down)}' if down else '0'}"
     return text
 
 
@@ -265,6 +268,7 @@ def _draw_section(
     window = view.window(axes)
     _fill(axes, view, lines, window, facecolor=ROOM, lw=0.0)
     _fill(axes, view, own, window, facecolor=PART, edgecolor=DARK_GREY, hatch="////", lw=0.5)
+    _draw_breaks(axes, view, own)
     tags, target = chamber.tags[row], chamber.on_target[row]
     _lines(axes, view, lines[tags == TAG_WALL], BLACK, 1.1)
     _lines(axes, view, lines[tags > TAG_WALL], SONOTRODE, 2.5)
@@ -301,6 +305,28 @@ def _draw_section(
     dimension(axes, (left, y), (left, low_at), 4.5, text, upright=True)
     text = _with_limits(plain(view.high[1]), float(view.high[1]), limits, "height_mm")
     dimension(axes, (right, y), (right, top), -4.5, text, upright=True)
+
+
+def _draw_breaks(axes: Axes, view: View, lines: np.ndarray) -> None:
+    """Draw a wave wherever a part is broken off, as it goes on beyond what is drawn of it.
+
+    Args:
+        lines: lines of the part's section, (k, 2, 2) [m].
+    """
+    sides, above = view.outside
+    low, high = view.place([view.low, view.high])
+    ends = view.place(1e3 * lines)
+    for axis, edge in ((0, low[0] - sides), (0, high[0] + sides), (1, high[1] + above)):
+        one, two = ends[:, 0], ends[:, 1]
+        crossing = (one[:, axis] > edge) != (two[:, axis] > edge)
+        one, two = one[crossing], two[crossing]
+        share = (edge - one[:, axis]) / (two - one)[:, axis]
+        places = np.sort((one + share[:, None] * (two - one))[:, 1 - axis])
+        for start, end in places[: len(places) // 2 * 2].reshape(-1, 2):
+            along = np.linspace(start, end, max(9, int(8.0 * (end - start) / WAVE)))
+            wave = edge + BREAK * np.sin(2.0 * np.pi * (along - start) / WAVE)
+            x, y = (wave, along) if axis == 0 else (along, wave)
+            axes.plot(x, y, color=BLACK, lw=0.6)
 
 
 def _draw_fixtures(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
@@ -350,10 +376,17 @@ def _draw_plan(
     is_upright = False
     for name, plane in zip("AB", planes, strict=False):
         at_x, at_y = view.place([plane.at, plane.at])
+        beside = plain(round(abs(plane.at), 1)) if abs(plane.at) > OFF_AXIS else ""
         if plane.right == 0:
             across_line(axes, (left - 3.0, at_y), (right + 3.0, at_y), name=name)
+            ends = (left, min(y, at_y)), (left, max(y, at_y))
+            if beside:
+                dimension(axes, *ends, 8.5, beside, upright=True)
         else:
             across_line(axes, (at_x, bottom - 3.0), (at_x, top + 3.0), name=name)
+            ends = (min(x, at_x), top), (max(x, at_x), top)
+            if beside:
+                dimension(axes, *ends, -3.5, beside)
             is_upright = True
     if len(planes) == 1:  # the other axis, and the length that the section does not show
         across = planes[0].right
@@ -422,3 +455,82 @@ def _lines(axes: Axes, view: View, lines: np.ndarray, colour: str, width: float)
 
 def _label(axes: Axes, x: float, y: float, text: str) -> None:
     axes.text(x, y, text, size=6.5, color=DARK_GREY, va="bottom", bbox=LABEL)
+
+
+OPENINGS_A_ROW = 2
+CAPTION = 8.0  # mm, of the words above the outline of an opening
+
+
+def draw_openings(
+    axes: Axes, openings: Sequence[tuple[str, Opening]], left: float, top: float, size: Point
+) -> str:
+    """Draw the outlines of openings with their two dimensions, and return their scale in words.
+
+    Args:
+        axes: axes of the whole page, in mm.
+        openings: openings with an outline, each with its words.
+        left, top: upper left corner of the drawing.
+        size: width and height that it may have.
+    """
+    room = size[0] / OPENINGS_A_ROW - 2.0 * BESIDE
+    rows = [openings[k : k + OPENINGS_A_ROW] for k in range(0, len(openings), OPENINGS_A_ROW)]
+    wide = 1e3 * max(one.size[0] for _, one in openings)
+    tall = [1e3 * max(one.size[1] for _, one in row) for row in rows]
+    words = len(rows) * (CAPTION + BELOW)
+    scale = next(
+        (x for x in SCALES if x * wide <= room and x * sum(tall) + words <= size[1]), SCALES[-1]
+    )
+    y = top
+    for row, height in zip(rows, tall, strict=True):
+        low = y - CAPTION - scale * height
+        for column, (text, one) in enumerate(row):
+            x = left + column * size[0] / OPENINGS_A_ROW + BESIDE
+            _draw_opening(axes, one, (x, low), scale)
+            axes.text(x, y, text, size=SIZE, va="top", parse_math=False)
+        y = low - BELOW
+    return _scale_in_words(scale)
+
+
+def _draw_opening(axes: Axes, one: Opening, corner: Point, scale: float) -> None:
+    """Draw the outline of an opening above and right of a corner on the page [mm]."""
+    assert one.outline is not None
+    half = 500.0 * np.array(one.size)
+    view = View(0, scale, np.array(corner), -half, half, np.zeros(2))
+    edges = _closing(one.outline)
+    closed = np.concatenate([one.outline, edges])
+    look: Any = {"facecolor": PART, "edgecolor": DARK_GREY, "hatch": "////", "lw": 0.0}
+    _fill(axes, view, closed, view.window(axes), **look)
+    _lines(axes, view, one.outline, BLACK, 1.1)
+    for line in view.place(1e3 * edges):
+        axes.plot(*line.T, color=BLACK, lw=0.6, ls=(0, (4, 3)))
+    (x1, y1), (x2, y2) = view.place([-half, half])
+    wide, tall = (plain(round(float(2.0 * side), 1)) for side in half)
+    dimension(axes, (x1, y1), (x2, y1), 5.0, wide)
+    dimension(axes, (x1, y1), (x1, y2), 5.0, tall, upright=True)
+
+
+def _closing(outline: np.ndarray) -> np.ndarray:
+    """Return the lines that close an outline where the part goes on over an edge of its wall.
+
+    Args:
+        outline: directed sides (k, 2, 2), all round the part in the same sense.
+    Returns:
+        Lines (n, 2, 2), one from the end of each open row of sides.
+    """
+    following = {tuple(one): tuple(two) for one, two in outline.tolist()}
+    starts = [one for one in following if one not in {*following.values()}]
+    last = {}
+    for one in starts:
+        end = one
+        while end in following:
+            end = following[end]
+        last[one] = end
+    lines = [
+        (end, min([x for x in starts if x != own] or [own], key=lambda x: math.dist(x, end)))
+        for own, end in last.items()
+    ]
+    return np.array(lines).reshape(-1, 2, 2)
+
+
+def _scale_in_words(scale: float) -> str:
+    return f"{plain(scale)}:1" if scale >= 1.0 else f"1:{plain(1.0 / scale)}"

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE
-from chamberopt.geometry.triangles import border_edges
+from chamberopt.geometry.triangles import border_edges, connected_pieces
 
 if TYPE_CHECKING:
     from matplotlib.path import Path
@@ -28,6 +27,7 @@ AREA, OUTLINE = 0.5, 0.5
 # Share of a score that counts off the chamber's axis, and of the best score from which on the plane
 # along the longer side is taken.
 AS_GOOD = 0.9
+SPECK = 1e-3  # share of the cut area below which a piece is none
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,9 @@ class SectionPlane:
 def section_planes(chamber: Chamber) -> list[SectionPlane]:
     """Return one plane that shows the part best, or two across each other if one does not do.
 
-    Of planes that show the part about alike, the one through the chamber's axis is taken, along the
-    longer side of the chamber. Planes that miss the target are taken only if all do.
+    Of planes that show the part about alike, the one through the chamber's axis is taken, or
+    through the part's middle, along the longer side of the chamber. It is taken too where it shows
+    most of the part in one piece. Planes that miss the target are taken only if all do.
     """
     size = np.ptp(chamber.vertices, axis=0)
     longer = int(size[1] > size[0] + 1e-3 * SAME)
@@ -64,42 +65,52 @@ def section_planes(chamber: Chamber) -> list[SectionPlane]:
 
 
 class _Cut(NamedTuple):
-    """A plane, the area of the part in it [m²], and the length of the target's line there [m]."""
+    """A plane, and what of the part is in it."""
 
     plane: SectionPlane
-    area: float
-    target: float
+    area: float  # [m²]
+    target: float  # length of the target's line [m]
+    pieces: int  # in which the part is seen
+    is_central: bool  # through the chamber's axis, or through the middle of the part
 
 
 def _best_plane(planes: list[_Cut], most: tuple[float, float]) -> tuple[SectionPlane, float]:
-    """Return the best of parallel planes with its score, of which the first has an advantage.
+    """Return the best of parallel planes with its score, of which central ones have an advantage.
 
     Args:
         planes: the planes.
         most: largest of all areas and lengths, also of the planes across.
     """
     area, length = most
-    scored = [
-        (one.plane, one.plane.span + AREA * one.area / area + OUTLINE * one.target / length)
+
+    def score(one: _Cut) -> float:
+        own = one.plane.span + AREA * one.area / area + OUTLINE * one.target / length
+        return own if one.is_central else AS_GOOD * own
+
+    best = max(planes, key=score)  # the first of equal ones
+    whole = [
+        one
         for one in planes
+        if one.is_central and one.pieces == 1 and one.plane.span >= ENOUGH * best.plane.span
     ]
-    first, *others = scored
-    return max([first, *((plane, AS_GOOD * score) for plane, score in others)], key=itemgetter(1))
+    if not best.is_central and whole:
+        best = max(whole, key=score)
+    return best.plane, score(best)
 
 
 def _planes(chamber: Chamber, right: int) -> list[_Cut]:
     """Return parallel planes through the part.
 
-    The plane through the chamber's axis is the first if it meets the part there, else the plane
-    through the middle of the part in the chamber.
+    The plane through the chamber's axis is the first if it meets the part there. The next is the
+    plane through the middle of the part in the chamber.
     """
     part, other = chamber.part, 1 - right
     inside = chamber.vertices[np.unique(chamber.triangles[chamber.tags == TAG_PART])]
     low, high = inside[:, other].min(), inside[:, other].max()
-    middle = 0.0 if low < 0.0 < high else 0.5 * (low + high)
-    places = [middle, *np.linspace(low, high, TRIED + 2)[1:-1]]
+    central = [0.0] * bool(low < 0.0 < high) + [0.5 * float(low + high)]
+    places = [*central, *np.linspace(low, high, TRIED + 2)[1:-1]]
     whole, found = np.ptp(part.vertices[:, [right, 2]], axis=0), []
-    for at in places:
+    for number, at in enumerate(places):
         lines, cut_ones = cut(part.vertices, part.triangles, other, at)
         ends = lines.reshape(-1, 2)
         span = float(np.prod(np.ptp(ends, axis=0) / whole)) if len(ends) else 0.0
@@ -108,8 +119,22 @@ def _planes(chamber: Chamber, right: int) -> list[_Cut]:
         area = 0.5 * abs(float(np.sum(x1 * y2 - x2 * y1)))
         plane = SectionPlane(right, 1e3 * float(at), span)
         on_target = np.linalg.norm(np.diff(lines[part.target[cut_ones]], axis=1), axis=2)
-        found.append(_Cut(plane, area, float(on_target.sum())))
+        is_central = number < len(central)
+        found.append(_Cut(plane, area, float(on_target.sum()), _pieces(lines), is_central))
     return found
+
+
+def _pieces(lines: np.ndarray) -> int:
+    """Return the number of areas that lines (k, 2, 2) of a cut go round, without their holes."""
+    if not len(lines):
+        return 0
+    ends, numbers = np.unique(lines.reshape(-1, 2), axis=0, return_inverse=True)
+    one, two = numbers.reshape(-1, 2).T
+    count, loop = connected_pieces(one, two, len(ends))
+    (x1, y1), (x2, y2) = lines[:, 0].T, lines[:, 1].T
+    turned = np.bincount(loop[one], x1 * y2 - x2 * y1, count)
+    least = SPECK * abs(turned.sum())
+    return int((turned * np.sign(turned.sum()) > least).sum())
 
 
 def cut(

@@ -15,13 +15,30 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.checks.openings import find_openings
+from chamberopt.chamber.checks.strips import strip_of_target
+from chamberopt.chamber.checks.usual import usual_for_target
+from chamberopt.chamber.fixture import plugs_of
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, write_bytes
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
-from chamberopt.documents.sheet import AsBuilt, chamber_limits, process_sheet
+from chamberopt.documents.sheet import (
+    OUTLINES,
+    AsBuilt,
+    chamber_limits,
+    drawn_openings,
+    process_sheet,
+    slit_limits,
+)
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
 from chamberopt.pictures.charts.figure_style import ignore_settings_here
-from chamberopt.pictures.part_drawing import LEGEND, RASTER, Limits, draw_chamber, drawing_height
+from chamberopt.pictures.part_drawing import (
+    LEGEND,
+    RASTER,
+    Limits,
+    draw_chamber,
+    draw_openings,
+    drawing_height,
+)
 from chamberopt.pictures.section import face_size_mm
 from chamberopt.printers.report_page import PageFile, require_free_page
 from chamberopt.results.arrays_file import load_chamber
@@ -33,6 +50,7 @@ if TYPE_CHECKING:
     from matplotlib.font_manager import FontProperties
 
     from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.checks.openings import Opening
     from chamberopt.design.sonotrode import Face
 
 SHEET = "process_sheet.pdf"
@@ -244,9 +262,17 @@ def write_sheet(
     path = require_free_page(loaded.folder / SHEET if path is None else path, SHEET_FILE)
     with claim_file(path):
         chamber = load_chamber(loaded)
-        built = AsBuilt(face_size_mm(chamber), find_openings(chamber))
+        design, part = loaded.design, chamber.part
+        built = AsBuilt(
+            face_size_mm(chamber),
+            find_openings(chamber),
+            strip_of_target(design, part),
+            plugs_of(design, part),
+            usual_for_target(design, part),
+        )
         sheet = process_sheet(loaded, built, revision)
-        pages = draw_sheet(sheet, chamber, chamber_limits(loaded), loaded.design.sonotrode.face)
+        limits, face = slit_limits(loaded) | chamber_limits(loaded), design.sonotrode.face
+        pages = draw_sheet(sheet, chamber, limits, face, drawn_openings(built))
         _save(path, pages, sheet.name)
     return path, sheet
 
@@ -256,16 +282,18 @@ def draw_sheet(
     chamber: Chamber,
     limits: Limits = MappingProxyType({}),
     face: Face | None = None,
+    openings: Sequence[tuple[str, Opening]] = (),
 ) -> list[Figure]:
     """Return a process sheet as figures of its pages.
 
-    The first page has a heading, sentences in red, a drawing of the chamber and the content, and
-    each page has the title block at its foot.
+    The first page has a heading, sentences in red, a drawing of the chamber and the content, the
+    last one the outlines of openings, and each page has the title block at its foot.
 
     Args:
         sheet: a document as process_sheet makes it.
         limits: what the keys of [chamber] may be, for the drawing's dimensions.
         face: on which the chamber stands, if it is known.
+        openings: those that are cut along the part's section, each with its words.
     """
     ignore_settings_here()
     first, further, block = sheet.sections
@@ -277,7 +305,9 @@ def draw_sheet(
     top = _heading(axes, first.title, sheet, red)
     settings = [one for one in content if isinstance(one, Table) and not one.head]
     texts = (whole, settings, top - FOOT)
-    _, _, _, room = _laid_out(*texts, [DRAWING_PER_PT * size for size in SIZES])
+    shown, _, _, room = _laid_out(*texts, [DRAWING_PER_PT * size for size in SIZES])
+    if shown is settings:  # with somewhat smaller letters the drawing may have a larger scale
+        room = max(room, top - FOOT + _content(Writer(None, LEAST_ALONE), settings, 0.0))
     # A drawing of that scale is lower than its room: with less room the letters may be larger.
     tall = drawing_height(chamber, (INNER, min(MOST_DRAWING, room) - CAPTION))
     shown, size, most, _ = _laid_out(*texts, [CAPTION + tall] * len(SIZES))
@@ -288,6 +318,12 @@ def draw_sheet(
     if not alone:
         measured = [one for one in content if one not in settings]
         pages += _further_pages(further, measured, sheet.name)
+    if openings:
+        last, y = _further_page("Openings", sheet.name)
+        scale = draw_openings(last, openings, MARGIN, y - CAPTION, (INNER, y - FOOT - CAPTION))
+        text = f"{OUTLINES} Scale {scale}, dimensions in mm."
+        Writer(last, 6.0).write(text, MARGIN, y, INNER, colour=DARK_GREY)
+        pages.append(last)
     for number, one in enumerate(pages, 1):
         (fields,) = block.content
         assert isinstance(fields, Table)

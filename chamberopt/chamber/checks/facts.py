@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from chamberopt.chamber.checks.check import (
     warnings,
 )
 from chamberopt.chamber.checks.fillets import touched_by_curvature
+from chamberopt.chamber.fixture import plugs_of
 from chamberopt.chamber.flexure import flexure_facts, flexure_of_surfaces
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.reach import Reach, reached_part_share
@@ -25,6 +27,7 @@ from chamberopt.geometry.triangles import areas, tetrahedron_volumes
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.fixture import Plug
     from chamberopt.chamber.part import Part
     from chamberopt.design.load import Design
     from sim_core import TriangleMesh
@@ -238,14 +241,28 @@ def _fixture_facts(design: Design, chamber: Chamber) -> dict[str, Facts]:
     if design.holder is not None and design.holder.kind == "bore":
         facts["holder"] = {"kind": "bore", "clearance_mm": design.holder.clearance_mm}
     for name, one in chamber.fixtures.items():
+        if one.kind == "plugs":
+            sizes = _plug_facts(plugs_of(design, chamber.part))
+        else:
+            sizes = {"size_mm": [_rounded(1e3 * side) for side in one.size]}
+            sizes |= {"length_mm": _rounded(1e3 * one.length)} if one.length else {}
         facts[name] = {
             "kind": one.kind,
-            "size_mm": [_rounded(1e3 * side) for side in one.size],
-            "length_mm": _rounded(1e3 * one.length),
+            **sizes,
             "covered_mm2": _rounded(1e6 * one.covered),
             "covered_target_mm2": _rounded(1e6 * one.covered_target),
         }
     return facts
+
+
+def _plug_facts(plugs: Sequence[Plug]) -> Facts:
+    """Return the number of plugs, and diameter and depth of each size once; {} without any."""
+    each = [[float(f"{1e3 * x:.4g}") for x in plug] for plug in plugs]
+    sizes = [size for k, size in enumerate(each) if size not in each[:k]]
+    if not sizes:
+        return {}
+    diameters, depths = map(list, zip(*sizes, strict=True))
+    return {"holes": len(plugs), "hole_diameters_mm": diameters, "hole_depths_mm": depths}
 
 
 def _tolerance_facts(design: Design) -> dict[str, Facts]:

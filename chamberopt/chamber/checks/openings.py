@@ -6,7 +6,7 @@ Where a wall crosses a hole of the part, a piece of the wall stands in the hole.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,14 @@ LEAST_WAY = 0.05  # length of the mean unit normal below which a wall looks no w
 # Mean cosine between the way to the middle and the normals of the part round a piece of the wall,
 # from which on it stands in a hole: round a part that divides the room it is 0.
 HOLLOW = 0.2
+# m: an opening whose outline is nowhere farther from a rectangle or a circle is cut as such
+AS_CUT = 1e-4
+FACETED = 0.98  # least distance of a side's middle from that of a circle over the radius
+AT_EDGE = 1e-5  # m: a line this near to the edge of a wall lies on it
+PLATE = 0.01  # m outside a wall's inner face, in which the wall is, however thick
+
+Form = Literal["rectangle", "round", "other", "edge"]
+"""How an opening is cut: as a rectangle, drilled, along the part's section, or the wall ends."""
 
 
 class Opening(NamedTuple):
@@ -41,6 +49,12 @@ class Opening(NamedTuple):
     place: tuple[float, float, float]  # middle of that box, in the chamber's frame [m]
     beyond: float  # how far the part stands out, square to the wall [m]
     way: tuple[float, float, float]  # unit vector square to the wall, outwards
+    form: Form = "rectangle"
+    # Sides at which the part meets the wall, in it, from `place`, seen from outside [m], (k, 2, 2):
+    # level and up, or x and y in a ceiling.
+    outline: np.ndarray | None = None
+    # Of the box round the part in the first PLATE outside, if that is wider than the opening [m].
+    wider: tuple[float, float] | None = None
 
 
 class Joint(NamedTuple):
@@ -152,18 +166,23 @@ def find_openings(chamber: Chamber) -> list[Opening]:
     for wall in np.unique(names[~on_part & ~fixed & (chamber.source < 0)]):
         sides = np.flatnonzero(meets & np.repeat((names == wall) & ~on_part & ~fixed, 3))
         joint = Joint(sides_of(triangles)[sides], outward[sides // 3])
+        on_wall = np.unique(triangles[names == wall])
         lines: dict[tuple[float, ...], list[Joint]] = {}  # by the direction of their wall
         for loop in _loops(joint):
             if _is_hole_of_part(vertices, loop):
                 continue
             for own in _on_each_wall(loop):
                 one = _opening(chamber, wall, own)
-                if one is not None and min(one.size) > THIN:
-                    found.append(one)
-                elif one is not None:  # a side of the part, as wide as the wall, which it ends
+                if one is None:
+                    continue
+                if min(one.size) <= THIN or _crosses_wall(chamber, one, own, on_wall):
                     lines.setdefault(tuple(np.round(one.way, 3)), []).append(own)
+                else:
+                    found.append(one._replace(wider=_wider(chamber, one, own, on_wall)))
         for several in lines.values():
             one = _opening(chamber, wall, Joint(*map(np.concatenate, zip(*several, strict=True))))
+            if one is not None and len(several) == 1:
+                one = one._replace(form="edge")
             found += [] if one is None else [one]
     return sorted(found, key=lambda opening: -np.prod(opening.size))
 
@@ -210,11 +229,126 @@ def _opening(chamber: Chamber, wall: str, own: Joint) -> Opening | None:
     if np.linalg.norm(out) < LEAST_WAY:
         return None
     out /= np.linalg.norm(out)
-    if wall != SIDE_WALL:
-        size = np.ptp(points[:, :2], axis=0)
-    else:
-        level = np.array([-out[1], out[0], 0.0]) / np.hypot(out[0], out[1])
-        size = np.array([np.ptp(points @ level), np.ptp(points @ np.cross(out, level))])
+    sides = (points - middle) @ _frame(wall, out).T
+    low, high = sides.min(axis=0), sides.max(axis=0)
+    outline = (sides - 0.5 * (low + high)).reshape(-1, 2, 2)
+    wide, tall = (high - low).tolist()
     beyond = float(((chamber.part.vertices - middle) @ out).max())
     (x, y, z), (u, v, w) = middle.tolist(), out.tolist()
-    return Opening(wall, (float(size[0]), float(size[1])), (x, y, z), beyond, (u, v, w))
+    form = _form(outline, 0.5 * (high - low))
+    return Opening(wall, (wide, tall), (x, y, z), beyond, (u, v, w), form, outline)
+
+
+def _frame(wall: str, out: np.ndarray) -> np.ndarray:
+    """Return the two axes along a wall in which its openings are given, (2, 3).
+
+    Args:
+        out: unit vector square to the wall, out of the room, (3,).
+    """
+    if wall != SIDE_WALL:
+        return np.eye(3)[:2]
+    level = np.array([-out[1], out[0], 0.0]) / np.hypot(out[0], out[1])
+    return np.array([level, np.cross(out, level)])
+
+
+def _form(outline: np.ndarray, half: np.ndarray) -> Form:
+    """Return how an opening is cut. A rectangle may go on over the edge of its wall.
+
+    Args:
+        outline: as of `Opening`, from the middle of the box round it.
+        half: half of that box's sides [m], (2,).
+    """
+    middles = outline.mean(axis=1)
+    radius = float(half.mean())
+    off_circle = np.abs(np.linalg.norm(outline, axis=2) - radius)
+    is_square = float(np.ptp(half)) < AS_CUT
+    inner = np.linalg.norm(middles, axis=1).min()
+    if is_square and off_circle.max() < AS_CUT and inner > FACETED * radius:
+        return "round"
+    # A side that leaves the box round the opening leaves it in its middle, or at an end.
+    places = np.concatenate([outline.reshape(-1, 2), middles])
+    off_box = np.abs(np.abs(places) - half).min(axis=1)
+    return "rectangle" if off_box.max() < AS_CUT else "other"
+
+
+def _crosses_wall(chamber: Chamber, one: Opening, own: Joint, on_wall: np.ndarray) -> bool:
+    """Return whether the part, as wide as a wall, ends it along some sides.
+
+    They go from one edge of the wall to another, through the middle of it.
+
+    Args:
+        one: the opening as it would be if these sides went all round it.
+        on_wall: vertices of the wall, (n,).
+    """
+    from shapely import LineString, MultiPoint
+
+    places, times = np.unique(own.ends, return_counts=True)
+    ends = chamber.vertices[places[times == 1]]
+    if len(ends) != 2:
+        return False
+    out = np.array(one.way)
+    frame = _frame(one.wall, out)
+    flat = np.abs((chamber.vertices[on_wall] - one.place) @ out) < AS_CUT
+    points = chamber.vertices[on_wall[flat]] if flat.any() else ends
+    edge = MultiPoint(points @ frame.T).convex_hull.boundary
+    return bool(LineString(ends @ frame.T).centroid.distance(edge) > AT_EDGE)
+
+
+def _wider(
+    chamber: Chamber, one: Opening, own: Joint, on_wall: np.ndarray
+) -> tuple[float, float] | None:
+    """Return the sides of the box round the part in a flat wall, if it widens there; else None.
+
+    What goes out over an edge of the wall is of the next wall's opening.
+
+    Args:
+        own: sides of the opening.
+        on_wall: vertices of the wall, (n,).
+    """
+    out = np.array(one.way)
+    frame = np.vstack([_frame(one.wall, out), out])
+    corners = (chamber.vertices[on_wall] - one.place) @ frame.T
+    corners = corners[np.abs(corners[:, 2]) < AS_CUT]
+    rim = (chamber.vertices[own.ends.reshape(-1)] - one.place) @ frame.T
+    if np.abs(rim[:, 2]).max() > AS_CUT or not len(corners):
+        return None
+    rim_low, rim_high = rim[:, :2].min(axis=0), rim[:, :2].max(axis=0)
+    sides = ((chamber.part.vertices - one.place) @ frame.T)[chamber.part.triangles]
+    rows = np.flatnonzero((sides[..., 2].min(axis=1) < PLATE) & (sides[..., 2].max(axis=1) > 0.0))
+    inside = np.zeros(len(sides), dtype=bool)
+    inside[rows] = True
+    first, second = (side_pairs(chamber.part.triangles) // 3).T
+    together = inside[first] & inside[second]
+    piece = connected_pieces(first[together], second[together], len(sides))[1]
+    points = _clipped_sides(sides[rows], PLATE)
+    numbers = np.repeat(piece[rows], 3)
+    aside = np.abs(points[..., :2] - 0.5 * (rim_low + rim_high)) - 0.5 * (rim_high - rim_low)
+    at_rim = (np.abs(points[..., 2]) < AT_EDGE) & (aside < AT_EDGE).all(axis=-1)
+    points = points[:, np.isin(numbers, numbers[at_rim.any(axis=0)])].reshape(-1, 3)[:, :2]
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        return None
+    wall_low, wall_high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
+    low = np.where(rim_low < wall_low + AT_EDGE, rim_low, points.min(axis=0))
+    high = np.where(rim_high > wall_high - AT_EDGE, rim_high, points.max(axis=0))
+    wide, tall = (np.maximum(high, rim_high) - np.minimum(low, rim_low)).tolist()
+    is_wider = max(wide - one.size[0], tall - one.size[1]) > 2.0 * AS_CUT
+    return (wide, tall) if is_wider else None
+
+
+def _clipped_sides(triangles: np.ndarray, high: float) -> np.ndarray:
+    """Return the ends of the sides of triangles between two heights, 0 and another [m].
+
+    Args:
+        triangles: corners of the triangles, the height as the third number [m], (k, 3, 3).
+    Returns:
+        Ends (2, 3 k, 3) [m], which are not numbers of sides outside.
+    """
+    start, end = (triangles[:, order].reshape(-1, 3) for order in ([0, 1, 2], [1, 2, 0]))
+    rise = (end - start)[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.sort([-start[:, 2] / rise, (high - start[:, 2]) / rise], axis=0)
+    shares[:, rise == 0.0] = [[0.0], [1.0]]
+    ends = start + np.clip(shares, 0.0, 1.0)[..., None] * (end - start)
+    inside = (ends[..., 2] > -AT_EDGE) & (ends[..., 2] < high + AT_EDGE)
+    return np.where(inside[..., None], ends, np.nan)

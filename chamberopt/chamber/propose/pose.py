@@ -192,10 +192,8 @@ def pose_in_words(mesh: PartMesh, known: Sequence[Surface], turns: Turns) -> str
             if length > FLAT * np.linalg.norm(vectors, axis=1).sum():
                 down = float(np.clip(-whole @ up / length, -1.0, 1.0))
                 tilts[one.name] = float(np.degrees(np.arccos(down)))
-    axis = int(np.abs(up).argmax())
-    words = []
-    if abs(up[axis]) > np.cos(np.radians(LEVEL_DEG)):
-        words.append(f"the file's {'-' if up[axis] > 0.0 else '+'}{'xyz'[axis]} down")
+    axis = axis_down(turns)
+    words = [f"the file's {axis} down"] if axis else []
     level = [f"{name} level facing down" for name, tilt in tilts.items() if tilt < LEVEL_DEG]
     level += [f"{name} level facing up" for name, tilt in tilts.items() if tilt > 180.0 - LEVEL_DEG]
     words += level[:1]
@@ -206,6 +204,19 @@ def pose_in_words(mesh: PartMesh, known: Sequence[Surface], turns: Turns) -> str
     if turns[2]:
         words.append(f"turned by {turns[2]:.4g} degrees about the vertical")
     return ", ".join(words)
+
+
+def axis_down(turns: Turns) -> str:
+    """Return which axis of the part's file points down, as "+x"; "" if none does.
+
+    Args:
+        turns: turns of the part about x, then y, then z [degrees], (3,).
+    """
+    up = rotation_matrix(turns)[2]
+    axis = int(np.abs(up).argmax())
+    if abs(up[axis]) <= np.cos(np.radians(LEVEL_DEG)):
+        return ""
+    return f"{'-' if up[axis] > 0.0 else '+'}{'xyz'[axis]}"
 
 
 def _poses(normal: np.ndarray, weight: np.ndarray) -> Iterator[tuple[Turns, float]]:

@@ -11,7 +11,7 @@ import numpy as np
 from chamberopt.chamber.fixture import ACROSS
 from chamberopt.chamber.propose.pose import Turns, square_to_walls, turns_down
 from chamberopt.chamber.propose.proposed_target import CREASE_DEG
-from chamberopt.common.number_text import plain
+from chamberopt.design.fixture import joint_in_words
 from chamberopt.geometry.face_shapes import is_hole
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import (
@@ -148,7 +148,7 @@ def arbor_through(
     elif abs(axis[2]) < LEVEL:
         level = np.round(axis * [1.0, 1.0, 0.0], 4) + 0.0
         keys |= {"axis": level.tolist(), "both_sides": True}
-        where = f"through both side walls, with gaps below {plain(5e2 * ball, 2)} mm, half a ball"
+        where = f"through both side walls, with gaps of {joint_in_words(1e3 * ball)}"
     else:
         return None
     text = (

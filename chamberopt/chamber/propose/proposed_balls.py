@@ -16,6 +16,7 @@ import numpy as np
 
 from chamberopt.chamber.checks.fillets import AS_DRAWN, OF_FILLET, OF_SLOT, inner_edges
 from chamberopt.chamber.checks.jams import JAM_BAND, MAX_COSINE, MIN_AREA
+from chamberopt.chamber.checks.usual import DEEPEST
 from chamberopt.chamber.largest_ball import largest_balls, spread_points
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
@@ -34,7 +35,7 @@ MOSTLY = 0.85
 # Balls in the charge: of sizes that need more, the largest is taken that serves as well. Thousands
 # of small balls make weak dents, are hard to get back from a chamber, and are slow to simulate.
 MANY = 3000
-DEEPEST, THIN_SHARE = 10e-3, 0.05  # m that is measured under a target; share that may be thin
+THIN_SHARE = 0.05  # of a target that may be thin
 OF_THIN = 1.5  # diameter of the largest balls over that depth, by heart
 MOST_LISTED = 5  # sizes in a reason
 LARGEST_BALL = 3e-3  # m: larger balls are in use, but they are few and slow to cover

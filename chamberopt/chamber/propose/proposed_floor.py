@@ -27,8 +27,7 @@ from chamberopt.chamber.propose.proposed_end import Strips
 from chamberopt.chamber.propose.proposed_sizes import Sizes
 from chamberopt.chamber.shop import Shop, Stand
 from chamberopt.common.errors import InputError
-from chamberopt.common.number_text import plain
-from chamberopt.design.fixture import WIDEST_GAP
+from chamberopt.design.fixture import slit_in_words
 from chamberopt.design.sonotrode import Face
 from chamberopt.geometry.heights import lowest_over
 
@@ -51,7 +50,7 @@ def of_blocks(ball: float) -> str:
     """Return what is said of a floor of several sonotrodes, for a diameter of the balls [m]."""
     return (
         "LARGER THAN ONE SONOTRODE: several side by side, which vibrate in phase and alike; gaps "
-        f"between them below {plain(1e3 * WIDEST_GAP * ball, 3)} mm, half a ball"
+        f"between them of {slit_in_words(1e3 * ball)}, half a ball"
     )
 
 

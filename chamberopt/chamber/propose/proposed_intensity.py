@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.checks.usual import thickness_under_target
 from chamberopt.chamber.propose.proposal import BallTrial, Proposal, Wanted
 from chamberopt.chamber.propose.proposed_balls import (
     AS_GOOD,
-    DEEPEST,
     LARGEST_BALL,
     MANY,
     MISSED,
@@ -48,7 +48,6 @@ from chamberopt.design.intensity import (
     why_none,
 )
 from chamberopt.design.materials import alloy
-from chamberopt.geometry.thickness import depth_below
 
 MOST_PILOTS = 5
 ON_N = 0.1016  # mmA: 0.004 in, below which N strips are taken (SAE J443)
@@ -327,7 +326,7 @@ def usual_for(made: Proposal) -> WantedIntensity:
 
     Raises InputError if none is.
     """
-    metal, thickness = alloy(made.tables["materials"]["part"]), _thickness(made)
+    metal, thickness = (alloy(made.tables["materials"]["part"]), _thickness(made))
     found = usual_intensity(metal, thickness)
     if found is None:
         raise InputError(f"--intensity: given usual, but {why_none(metal, thickness)}")
@@ -340,7 +339,7 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
     Args:
         predicted: by a pilot; None if it is not known.
     """
-    metal, thickness = alloy(made.tables["materials"]["part"]), _thickness(made)
+    metal, thickness = (alloy(made.tables["materials"]["part"]), _thickness(made))
     expected = "not known: the pilot left hardly a dent"
     if predicted is not None:
         expected = f"expected {_with_strip(predicted)}"
@@ -406,18 +405,8 @@ def _with_strip(predicted: PredictedIntensity) -> str:
 
 
 def _thickness(made: Proposal) -> float:
-    """Return the thickness [m] by which an intensity is usual for a proposal's target.
-
-    It is that of the middle of its area, unless a quarter of it is too thin for any usual one.
-    """
-    thin = _depth(made, 0.25)
-    return thin if 1e3 * thin < THIN_MM else _depth(made, 0.5)
-
-
-def _depth(made: Proposal, share: float) -> float:
-    """Return the depth of material [m] than which a share of a proposal's target has less."""
-    part = made.chamber.part
-    return depth_below(part.vertices, part.triangles, part.target, share, DEEPEST)
+    """Return the thickness [m] by which an intensity is usual for a proposal's target."""
+    return thickness_under_target(made.chamber.part)
 
 
 def with_prediction(

@@ -13,12 +13,16 @@ import trimesh
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.openings import Opening
+from chamberopt.chamber.checks.strips import StripOfTarget
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text
+from chamberopt.design.almen_strip import USUAL_K
+from chamberopt.design.fixture import LEAST_GAP_MM, joint_in_words, slit_mm, tight_gap_mm
+from chamberopt.design.intensity import WantedIntensity
 from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.design.sonotrode import Face
 from chamberopt.documents.coverage import figures
@@ -28,15 +32,17 @@ from chamberopt.documents.sheet import (
     AsBuilt,
     alarms,
     chamber_limits,
+    drawn_openings,
     first_checks,
     limit_tables,
     process_sheet,
     setting_tables,
+    slit_limits,
     title_block,
 )
 from chamberopt.documents.wording import metric_label, plain
 from chamberopt.peening.tolerance_result import ToleranceResult, ToleratedFigure
-from chamberopt.pictures.part_drawing import draw_chamber, drawing_height
+from chamberopt.pictures.part_drawing import draw_chamber, draw_openings, drawing_height
 from chamberopt.pictures.section import cut, face_size_mm, inside, section_planes
 from chamberopt.printers.sheet_page import (
     HEIGHT,
@@ -49,7 +55,7 @@ from chamberopt.printers.sheet_page import (
     write_sheet,
 )
 from chamberopt.results.load import Result, load_result
-from chamberopt.results.records import TrappedRecord, ZoneLimit, ZoneRecord
+from chamberopt.results.records import FixtureRecord, TrappedRecord, ZoneLimit, ZoneRecord
 from tests.helpers.results.report_folders import simulated
 from tests.helpers.synthetic import chamber_round, machine_values, plate_design
 
@@ -109,15 +115,144 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
     tables = setting_tables(bore, AsBuilt((50.0,), openings))
     rows = next(one for one in tables if one.caption == "Chamber").rows
     assert [text for name, text in rows if name == "opening"] == [
-        "60 × 80 mm in the wall at +y round (0, 40, 62.4) mm in the chamber's frame; the part "
-        "stands out by 9.3 mm: clamp it there",
-        "12 × 80 mm in the wall at −x round (−40, 0, 62.4) mm; the part fills it",
-        "12 mm of the ceiling, which ends on the part, round (0, 0, 119) mm; the part stands out "
+        "60 × 80 mm in the wall at +y, its middle at (0, 40, 62.4) mm in the chamber's frame; "
+        "the part stands out by 9.3 mm: clamp it there",
+        "12 × 80 mm in the wall at −x, its middle at (−40, 0, 62.4) mm; the part fills it",
+        "12 mm of the ceiling, which ends on the part, at (0, 0, 119) mm; the part stands out "
         "by 1.2 mm",
     ]
+    first = openings[0]
+    forms = [
+        first._replace(form="round", size=(0.0604, 0.06041), way=(0.0, 0.89, -0.456)),
+        first._replace(form="other", wider=(0.0612, 0.08)),
+    ]
+    tables = setting_tables(bore, AsBuilt((50.0,), forms))
+    told = next(one for one in tables if one.caption == "Chamber").rows
+    circle, section = (text.split(" in the wall")[0] for name, text in told if name == "opening")
+    assert circle == "round, Ø 60.4 mm,"
+    assert dict(told)["opening"].count("in the wall at +y, its middle") == 1
+    assert section == "along the part's section, within 60 × 80 mm, no rectangle,"
+    assert "it widens to 61.2 × 80 mm in the first 10 mm outside" in dict(told)["opening"]
     assert dict(rows)["holder"].endswith("0.2 mm of clearance all round")
     assert dict(rows)["gaps"].startswith("round the part as above, of all other joints at most 0.4")
     assert rows_of(result)["Chamber"]["gaps"].startswith("of joints and openings at most 0.42 mm")
+
+
+def test_what_a_shop_needs_of_pose_target_strip_and_flanges(folder: Path) -> None:
+    result = load_result(folder)
+    poses = {
+        (0, 0, 0): "as in its file: −z down",
+        (180, 0, 0): "180° about x: +z down",
+        (0, 90, 30): "90° about y, then 30° about z: +x down",
+        (45, 0, 0): "45° about x",
+    }
+    for turns, told in poses.items():
+        design = result.design.changed({"part.rotate_deg": turns})
+        rows = rows_of(replace(result, design=design))["Part and pose"]
+        assert rows["turned"] == told
+
+    faces = ({"at_mm": (1.0, 2.25, -0.04), "alike": True}, {"at_mm": (0.0, 0.0, 0.0)})
+    named = result.design.changed({"part.target": {"surface": "root", "faces": faces}})
+    rows = rows_of(replace(result, design=named))["Part and pose"]
+    assert rows["target, chosen by"] == (
+        "the surface root of its file; 2 faces, such as at (1, 2.2, 0) mm of its file, with "
+        "all faces alike"
+    )
+    strip = StripOfTarget(1, 0.0664, 0.1288, 0.004, 0.316)
+    table = setting_tables(result, AsBuilt((50.0,), strip=strip))[0]
+    assert dict(table.rows)["a strip at a time"].startswith(
+        "setting 2 of 5: y 66.4 to 128.8 mm of its file; the part is moved by 62.4 mm along that y"
+    )
+    for both, ends in ((True, "flanges at both ends"), (False, "a flange at the end")):
+        flanges = {"diameter_mm": 61.5, "thickness_mm": 2.0, "both_sides": both}
+        holder = {"kind": "arbor", "at": {"faces": faces[1:]}, **flanges}
+        made = FixtureRecord(
+            kind="arbor", size_mm=[25.0], length_mm=54.0, covered_mm2=9.0, covered_target_mm2=0.0
+        )
+        chamber = result.record.chamber.model_copy(update={"fixtures": {"holder": made}})
+        record = result.record.model_copy(update={"chamber": chamber})
+        held = replace(result, record=record, design=result.design.changed({"holder": holder}))
+        told = rows_of(held)["Chamber"]["holder"]
+        assert f"54 mm long, with {ends} of the part, Ø 61.5 × 2 mm" in told
+
+
+def test_the_slit_round_the_sonotrode_is_in_the_dimensions(folder: Path) -> None:
+    """The wall goes round a face as wide as the floor, and stands on a larger one."""
+    result = load_result(folder)
+    for face, want in (({"diameter_mm": 50.0}, "Ø 50 +3/0"), ({"diameter_mm": 60.0}, "Ø 50")):
+        design = result.design.changed({"sonotrode.face": face})
+        limits = slit_limits(replace(result, design=design))
+        axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
+        draw_chamber(axes, build_chamber(design), 0.0, 100.0, (180.0, 100.0), limits)
+        assert want in [one.get_text() for one in axes.texts]
+        told = rows_of(replace(result, design=design))["Sonotrode"].get("wall round the face")
+        is_round = "diameter 50 mm and a slit at both sides, at most 53 mm"
+        assert told == (is_round if want.endswith("/0") else None)
+    assert slit_limits(result) == {}
+
+
+def test_an_intensity_off_the_usual_one_is_told_in_red(folder: Path) -> None:
+    usual = WantedIntensity(0.2, 0.3, "usual for steel")
+    built = AsBuilt((50.0,), usual=usual)
+    for value, want in ((0.1, "below"), (0.24, ""), (0.5, "above")):
+        found = load_result(folder)
+        found.metrics["strength_um"] = Estimate(1e3 * value / USUAL_K, 0.01)
+        sheet = process_sheet(found, built).sections[0].content
+        red = [one.text for one in sheet if isinstance(one, Sentence) and one.kind == "warning"]
+        off = [one for one in red if "expected Almen intensity" in one]
+        assert len(off) == bool(want)
+        assert all(f"{value} mmA, is {want} 0.2 to 0.3 mmA, usual for steel" in one for one in off)
+        (table,) = (one for one in sheet if isinstance(one, Table) and "expect" in one.caption)
+        assert ("Almen intensity, usual", "0.2 to 0.3 mmA, usual for steel") in table.rows
+        asked = replace(found, design=found.design.changed({"process.intensity_mmA": (0.1, 0.2)}))
+        asked.metrics.update(found.metrics)
+        sheet = process_sheet(asked, built).sections[0].content
+        assert not [x for x in sheet if isinstance(x, Sentence) and "expected Almen" in x.text]
+
+
+def test_joints_are_as_tight_on_the_sheet_as_the_proposal_has_them(folder: Path) -> None:
+    """By the geometry of fixture.py: in a tight gap a ball sinks by a hundredth of its radius."""
+    result = load_result(folder)
+    for ball in (0.4, 1.588, 3.0):
+        gap = tight_gap_mm(ball)
+        sinks = 0.5 * (ball - math.sqrt(ball**2 - gap**2))
+        assert sinks <= 0.01 * 0.5 * ball or gap == LEAST_GAP_MM
+        assert slit_mm(ball) == pytest.approx(0.5 * ball, abs=0.01)
+        design = result.design.changed({"shot.diameter_mm": ball, "shot.mass_g": 1.0})
+        told = rows_of(replace(result, design=design))["Chamber"]["gaps"]
+        assert f"openings {joint_in_words(ball)}, or sealed" in told
+
+
+def sides(*corners: tuple[float, float]) -> np.ndarray:
+    """The lines from each of the corners [mm] to the next one, (k, 2, 2) [m]."""
+    return 1e-3 * np.stack([corners[:-1], corners[1:]], axis=1)
+
+
+def test_outlines_of_openings_are_drawn_with_two_dimensions() -> None:
+    """A U, a U whose wall ends above it, and a wedge that goes on to both sides."""
+    legs = [(-20, 9), (-20, -9), (-17, -9), (-17, 6), (17, 6), (17, -9), (20, -9), (20, 9)]
+    wedge = np.concatenate([sides((-30, -12), (30, -8)), sides((30, 8), (-30, 12))])
+    shapes = [
+        ((40, 18), sides(*legs, legs[0]), 2 * 3 * 18 + 34 * 3),
+        ((40, 18), sides(*legs), 2 * 3 * 18 + 34 * 3),
+        ((60, 24), wedge, 60 * 20),
+    ]
+    for (wide, tall), outline, area in shapes:
+        at = (0.0, 0.0, 0.1), 0.01, (0.0, 0.0, 1.0)
+        one = Opening("the ceiling", (1e-3 * wide, 1e-3 * tall), *at, "other", outline)
+        (words, _), *_ = drawn = drawn_openings(AsBuilt((50.0,), [one, one, one]))
+        assert words.startswith("the ceiling, middle at")
+        figure = Figure(figsize=(WIDTH / 25.4, HEIGHT / 25.4))
+        axes = figure.add_axes((0, 0, 1, 1), xlim=(0, WIDTH), ylim=(0, HEIGHT))
+        scale = draw_openings(axes, drawn, MARGIN, 200.0, (180.0, 180.0))
+        assert scale == "1:1"
+        boxes = boxes_of(figure)
+        require_apart(boxes)
+        assert [text for text, _ in boxes].count(str(wide)) == 3
+        assert [text for text, _ in boxes].count(str(tall)) == 3
+        (x, y) = axes.patches[0].get_path().vertices.T
+        found = 0.5 * abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+        assert found == pytest.approx(area, rel=1e-6)
 
 
 def test_what_the_best_costs_is_on_the_sheet(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -334,6 +469,59 @@ def test_the_section_shows_the_target() -> None:
     assert plane.right == 1
 
 
+@pytest.mark.parametrize("thick", [1.0, 6.0])
+def test_the_section_shows_a_part_in_one_piece_if_its_middle_does(thick: float) -> None:
+    """Two bars one over the other, joined by a web in the middle, from which the target is gone.
+
+    Beside the web the target's line is longer, but the bars look like two loose pieces.
+    """
+    bounds = [((-20, -9, 0), (20, 9, 6)), ((-20, -9, -20), (20, 9, -14))]
+    bounds.append(((-19.9, -0.5 * thick, -15), (19.9, 0.5 * thick, 1)))
+    bars = [trimesh.creation.box(bounds=1e-3 * np.array(one)) for one in bounds]
+    body = trimesh.boolean.union(bars, engine="manifold")
+    inner = np.abs(body.face_normals[:, 2]) > 0.9
+    inner &= np.abs(1e3 * body.triangles_center[:, 2] + 7.0) < 7.1
+    (plane,) = section_planes(chamber_round(body, inner))
+    assert (plane.right, plane.at) == (0, pytest.approx(0.0, abs=1e-9))
+
+
+def on_sonotrode(chamber: Chamber) -> Chamber:
+    """A chamber whose floor is a sonotrode."""
+    height = chamber.vertices[chamber.triangles][..., 2].max(axis=1)
+    face = np.where(height < height.min() + 1e-9, TAG_SONOTRODE, chamber.tags).astype(np.uint8)
+    return replace(chamber, tags=face)
+
+
+def test_the_place_of_a_section_beside_the_axis_is_dimensioned() -> None:
+    for x, y, right in ((0.0, 9.0, 0), (11.0, 0.0, 1)):
+        size = (40e-3, 4e-3, 4e-3) if right == 0 else (4e-3, 40e-3, 4e-3)
+        bar = trimesh.creation.box(size)
+        bar.apply_translation((1e-3 * x, 1e-3 * y, 0.0))
+        chamber = on_sonotrode(chamber_round(bar))
+        (plane,) = section_planes(chamber)
+        assert plane.right == right
+        axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
+        draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0))
+        assert plain(x + y) in [one.get_text() for one in axes.texts]
+
+
+def test_what_stands_out_of_the_chamber_is_drawn_or_broken_off() -> None:
+    """A post of 6 mm through the ceiling: as long as there is room for it, else with a wave."""
+    waves = {}
+    for beyond in (5e-3, 0.5):
+        chamber = on_sonotrode(chamber_round(trimesh.creation.box((6e-3, 6e-3, 20e-3))))
+        vertices = chamber.part.vertices.copy()
+        vertices[vertices[:, 2] > 0.0, 2] = chamber.vertices[:, 2].max() + beyond
+        chamber = replace(chamber, part=replace(chamber.part, vertices=vertices))
+        axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
+        draw_chamber(axes, chamber, 0.0, 150.0, (180.0, 150.0))
+        curves = [np.array(one.get_xydata()) for one in axes.lines]
+        waves[beyond] = [one for one in curves if len(one) > 5 and np.ptp(one[:, 1]) < 1.1]
+    assert waves[5e-3] == []
+    (wave,) = waves[0.5]
+    assert np.ptp(wave[:, 0]) > 5.0
+
+
 def test_the_section_shows_the_profile_that_is_peened() -> None:
     """Four ribs along y, the longer side: a plane along them shows a block."""
     bounds = [((-15e-3, -17e-3, 0.0), (15e-3, 17e-3, 10e-3))]
@@ -358,9 +546,7 @@ def test_the_section_shows_the_part() -> None:
     assert {one.right for one in planes} == {0, 1}
     axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
     chamber = chamber_round(trimesh.util.concatenate([bar, other]))
-    height = chamber.vertices[chamber.triangles][..., 2].max(axis=1)
-    face = np.where(height < height.min() + 1e-9, TAG_SONOTRODE, chamber.tags).astype(np.uint8)
-    chamber = replace(chamber, tags=face)
+    chamber = on_sonotrode(chamber)
     drawn = draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0))
     assert drawn.startswith("Sections A–A and B–B")
     assert "dashed" not in drawn

@@ -18,6 +18,13 @@ DESIGNS = Path(__file__).resolve().parents[4] / "designs"
 def chamber_of(
     folder: Path, body: trimesh.Trimesh, plugs: dict[str, object] | None = None, **part: object
 ) -> Chamber:
+    """The chamber of `design_of`."""
+    return build_chamber(design_of(folder, body, plugs, **part))
+
+
+def design_of(
+    folder: Path, body: trimesh.Trimesh, plugs: dict[str, object] | None = None, **part: object
+) -> Design:
     """A body in mm, 15 mm over the floor of a box of 60 x 50 x 40 mm; its underside is peened.
 
     Args:
@@ -31,7 +38,7 @@ def chamber_of(
     chamber = {"shape": "box", **sizes}
     mask = None if plugs is None else {"plugs": True, "at": plugs}
     own = {"part": {**given, **part}, "chamber": chamber, "mask": mask}
-    return build_chamber(validate(Design, {**data, **own}))
+    return validate(Design, {**data, **own})
 
 
 def test_a_bar_through_both_side_walls_and_a_post_through_the_ceiling(tmp_path: Path) -> None:
@@ -68,6 +75,55 @@ def test_a_plate_that_closes_the_chamber_leaves_one_opening(tmp_path: Path) -> N
     assert one.wall == "the ceiling"
     assert 1e3 * np.array(one.size) == pytest.approx([60, 12], abs=1e-6)
     assert 1e3 * one.beyond == pytest.approx(15 + 50 - 40)
+
+
+def test_the_form_of_an_opening_is_that_of_the_parts_section(tmp_path: Path) -> None:
+    """Posts through the ceiling: round, of 24 to 96 facets; rectangular; a U; a hexagon; an ell."""
+    rim = [(-10.0, -6.0), (10.0, -6.0), (10.0, 6.0), (-10.0, 6.0)]
+    notch = [(-10.0, -6.0), (10.0, -6.0), (10.0, 6.0), (7.0, 6.0), (7.0, -3.0), (-7.0, -3.0)]
+    angles = np.radians(np.arange(0, 360, 60))
+    hexagon = 8.0 * np.c_[np.cos(angles), np.sin(angles)]
+    posts = {
+        "rectangle": [trimesh.creation.extrude_polygon(Polygon(rim), 50.0)],
+        "round": [trimesh.creation.cylinder(8.0, 50.0, sections=k) for k in (24, 96)],
+        "other": [
+            trimesh.creation.extrude_polygon(Polygon([*notch, (-7.0, 6.0), (-10.0, 6.0)]), 50.0),
+            trimesh.creation.extrude_polygon(Polygon(hexagon), 50.0),
+            trimesh.creation.extrude_polygon(Polygon([*notch[:4], (7.0, 0.0), (-10.0, 0.0)]), 50.0),
+        ],
+    }
+    for form, bodies in posts.items():
+        for body in bodies:
+            (one,) = find_openings(chamber_of(tmp_path, body))
+            assert one.form == form
+            assert one.outline is not None
+            assert 0.5 * np.array(one.size) == pytest.approx(abs(one.outline).max(axis=(0, 1)))
+            area = body.volume / 50.0
+            (x1, y1), (x2, y2) = 1e3 * one.outline[:, 0].T, 1e3 * one.outline[:, 1].T
+            assert 0.5 * abs(np.sum(x1 * y2 - x2 * y1)) == pytest.approx(area, rel=1e-6)
+
+
+def test_a_tapered_lid_as_long_as_its_chamber_has_one_opening(tmp_path: Path) -> None:
+    """Its sides run across the ceiling: neither of them is an opening by itself."""
+    outline = [(-40.0, -16.0), (40.0, -12.0), (40.0, 12.0), (-40.0, 16.0)]
+    lid = trimesh.creation.extrude_polygon(Polygon(outline), 30.0)
+    *aside, up = sorted(find_openings(chamber_of(tmp_path, lid)), key=lambda one: one.place[2])
+    assert (up.wall, up.form) == ("the ceiling", "other")
+    assert 1e3 * np.array(up.size) == pytest.approx([60.0, 31.0], abs=1e-3)
+    assert [one.form for one in aside] == ["rectangle", "rectangle"]
+
+
+def test_a_part_that_widens_in_the_wall(tmp_path: Path) -> None:
+    """A post with a head on it, which begins inside, 4 mm or 14 mm outside of the ceiling."""
+    post = trimesh.creation.box(bounds=((-5, -4, 0), (5, 4, 60)))
+    for start, want in ((20, None), (29, (18.0, 12.0)), (39, None)):
+        head = trimesh.creation.box(bounds=((-9, -6, start), (9, 6, 60)))
+        body = trimesh.boolean.union([post, head], engine="manifold")
+        (one,) = find_openings(chamber_of(tmp_path, body))
+        assert one.wider == (want if want is None else pytest.approx(1e-3 * np.array(want)))
+    bar = trimesh.creation.box((30, 20, 8))  # over a corner: the rest is of the other wall
+    over = find_openings(chamber_of(tmp_path, bar, offset_mm=(25.0, 20.0)))
+    assert [one.wider for one in over] == [None, None]
 
 
 def test_a_pipe_has_one_opening_and_a_part_in_the_air_none(tmp_path: Path) -> None:
@@ -110,6 +166,7 @@ def test_a_lid_wider_than_its_chamber_ends_all_walls(tmp_path: Path) -> None:
     lines = find_openings(chamber_of(tmp_path, trimesh.creation.box((80, 70, 40))))
     assert sorted(1e3 * max(one.size) for one in lines) == pytest.approx([50, 50, 60, 60])
     assert all(min(one.size) < 1e-9 for one in lines)
+    assert {one.form for one in lines} == {"edge"}
 
 
 def drilled(
