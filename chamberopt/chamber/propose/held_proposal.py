@@ -27,7 +27,7 @@ from chamberopt.chamber.propose.proposal import (
 from chamberopt.chamber.propose.proposed_arbor import Bore
 from chamberopt.chamber.propose.proposed_end import HeldEnd
 from chamberopt.chamber.propose.proposed_floor import Floor
-from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices
+from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices, thin_grip
 from chamberopt.chamber.propose.proposed_mask import are_holes, pads, to_be_masked, to_be_plugged
 from chamberopt.chamber.propose.proposed_sizes import LONG
 from chamberopt.chamber.propose.proposed_target import Target
@@ -98,6 +98,17 @@ def is_firm(made: Proposal) -> bool:
     """Return whether a holder holds the part by itself, as one that stands on a face does not."""
     holder = made.design.holder
     return holder is not None and (holder.kind in ("arbor", "bore") or holder.grip_mm is not None)
+
+
+def is_held_thinly(made: Proposal) -> bool:
+    """Return whether a holder grips an end that is too thin for what stands out of it."""
+    holder, part = made.design.holder, made.chamber.part
+    if holder is None or holder.grip_mm is None:
+        return False
+    axis = np.array(holder.axis, dtype=float)
+    axis /= np.linalg.norm(axis)
+    grip = 1e-3 * holder.grip_mm
+    return thin_grip(part.vertices, part.triangles, axis, grip) is not None
 
 
 def rests(made: Proposal) -> bool:

@@ -24,7 +24,7 @@ from chamberopt.geometry.face_shapes import (
     teeth_of,
 )
 from chamberopt.geometry.meshes.part_mesh import PartMesh, select_triangles
-from chamberopt.geometry.triangles import areas, border_edges
+from chamberopt.geometry.triangles import areas, border_edges, centre_of_mass
 
 TOLD = 0.5  # share of a surface that others named tell of, from which on it is not named
 CREASE_DEG = 30.0
@@ -93,6 +93,8 @@ class Target:
     keys: Keys
     triangles: np.ndarray  # (m,) bool
     reason: str
+    # Fillets that were chosen by their shape, of which it is made: some of them may be left out.
+    fillets: tuple[Surface, ...] = ()
 
 
 def surfaces(mesh: PartMesh) -> list[Surface]:
@@ -199,7 +201,7 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         return _joined(pattern, f"{text}{beside(others)}; {BY_SHAPE}")
     if fillets:
         text = f"by their shape, as such are usually peened{beside(faces)}; {BY_SHAPE}"
-        return _joined(fillets, text)
+        return replace(_joined(fillets, text), fillets=tuple(fillets))
     sizes = [area[one.triangles].sum() for one in faces]
     large = [one for one, size in zip(faces, sizes, strict=True) if size >= AS_LARGE * sizes[0]]
     large = [
@@ -208,6 +210,34 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         if one is large[0] or not is_inside_of_tube(mesh.vertices, own[one.triangles])
     ]
     return _joined(large, by_size("the largest between sharp edges", faces[len(large) :]))
+
+
+def fewer_fillets(mesh: PartMesh, target: Target) -> list[Target]:
+    """Return the targets that leave out fillets near the heavier end of a part, the fewest first.
+
+    So that end may be held. There are none of a target that is not fillets chosen by their shape.
+    """
+    axis = int(np.ptp(mesh.vertices, axis=0).argmax())
+    own, area = mesh.vertices[:, axis], areas(mesh.vertices, mesh.triangles)
+    heavy = float(centre_of_mass(mesh.vertices, mesh.triangles)[axis])
+    way = 1.0 if heavy > 0.5 * float(own.min() + own.max()) else -1.0
+    middle = way * own[mesh.triangles].mean(axis=1)
+    nearest = sorted(
+        target.fillets,
+        key=lambda one: -float(np.average(middle[one.triangles], weights=area[one.triangles])),
+    )
+    found = []
+    for number in range(1, len(nearest)):
+        without, left = nearest[:number], nearest[number:]
+        asked = " ".join(f'--target "{one.name}"' for one in without)
+        these = ", ".join(f"{one.name} ({one.text})" for one in without)
+        text = (
+            "by their shape, as such are usually peened, and so that an end is free to hold it by; "
+            f"FILLETS ARE NOT IN THE TARGET, {these}: give them a design of their own, by {asked}; "
+            f"{BY_SHAPE}"
+        )
+        found.append(_joined(left, text))
+    return found
 
 
 def crease_deg(mesh: PartMesh) -> float:

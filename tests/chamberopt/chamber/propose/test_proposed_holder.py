@@ -8,10 +8,17 @@ import pytest
 import trimesh
 from manifold3d import CrossSection, Manifold, OpType
 
+from chamberopt.chamber.propose import first_design
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.proposal import Wanted
+from chamberopt.chamber.propose.held_proposal import is_firm, is_held_thinly
+from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_end import bare_end, held_end
-from chamberopt.chamber.propose.proposed_holder import HolderChoice, end_holder, holder_choices
+from chamberopt.chamber.propose.proposed_holder import (
+    HolderChoice,
+    end_holder,
+    holder_choices,
+    thin_grip,
+)
 from chamberopt.chamber.propose.proposed_mask import find_left_out
 from chamberopt.chamber.propose.proposed_target import WHOLE, Surface, Target, apart
 from chamberopt.chamber.propose.text import clauses, design_text
@@ -316,3 +323,63 @@ def test_a_body_is_not_named_beside_its_faces() -> None:
     told = [(surface(name), float(one.sum()), one) for name, one in each.items()]
     assert [(one.name, size) for one, size in apart(told)] == [("FRONT", 4.0), ("REAR", 3.0)]
     assert apart([]) == []
+
+
+def blade_on_root(thick: float, long: float) -> trimesh.Trimesh:
+    """A blade, 30 mm wide, that stands along z on a block of 40 x 30 x 20 mm [mm]."""
+    root = Manifold.cube((40, 30, 20)).translate([-20, -15, -20])
+    return solid(root + Manifold.cube((30, thick, long)).translate([-15, -0.5 * thick, 0]))
+
+
+@pytest.mark.parametrize("larger", [1.0, 3.0])
+@pytest.mark.parametrize(
+    ("thick", "long", "axis", "is_thin"),
+    [
+        (2.0, 60.0, (0, 0, 1), True),
+        (3.0, 60.0, (0, 0, 1), True),
+        (12.0, 60.0, (0, 0, 1), False),  # of thick metal
+        (2.0, 20.0, (0, 0, 1), False),  # the centre of mass is near
+        (2.0, 60.0, (0, 0, -1), False),  # held by its root
+    ],
+)
+def test_a_blade_is_not_held_by_its_tip(
+    thick: float, long: float, axis: tuple[int, int, int], is_thin: bool, larger: float
+) -> None:
+    body = blade_on_root(thick, long)
+    grip = larger * 8e-3
+    found = thin_grip(1e-3 * larger * body.vertices, body.faces, np.array(axis, float), grip)
+    assert (found is not None) == is_thin
+    if found is not None:
+        middle = body.center_mass[2]
+        assert found.metal == pytest.approx(1e-3 * larger * thick, rel=0.1)
+        assert found.overhang == pytest.approx(1e-3 * larger * (long - 8.0 - middle), rel=1e-3)
+        assert "THIN GRIP" in clauses(found.text)[1][0]
+
+
+@pytest.mark.parametrize(("thick", "long"), [(2.0, 60.0), (3.0, 70.0)])
+def test_the_thin_end_of_a_blade_gives_way_to_its_root(
+    thick: float, long: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its foot is peened. As it lies what holds it is taken for thin, and it stands instead."""
+    body = blade_on_root(thick, long).subdivide_to_size(8.0)
+    z = body.triangles_center[:, 2]
+    foot = (z > -3.0) & (z < 8.0)
+    lines = [f"v {x} {y} {z}" for x, y, z in body.vertices]
+    for name, rows in (("FILLET", foot), ("OTHERS", ~foot)):
+        lines += [f"g {name}", *(f"f {a} {b} {c}" for a, b, c in body.faces[rows] + 1)]
+    part = tmp_path / "blade.obj"
+    part.write_text("\n".join(lines) + "\n")
+    monkeypatch.setattr(first_design, "propose_pose", lambda *_: ((0.0, 90.0, 0.0), "lying"))
+    found: list[bool] = []
+
+    def is_thin_at_first(made: Proposal) -> bool:
+        found.append(is_held_thinly(made) if found else True)
+        return found[-1]
+
+    monkeypatch.setattr(first_design, "is_held_thinly", is_thin_at_first)
+    made = propose(part, Wanted("mm"), lambda _: [])
+    assert found == [True, False]
+    assert made.design.part.rotate_deg[:2] == (180.0, 0.0)  # its root up
+    assert "held by an end of thicker metal" in made.reasons["part.rotate_deg"]
+    assert is_firm(made)
+    assert not is_held_thinly(made)
