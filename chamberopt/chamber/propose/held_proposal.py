@@ -67,8 +67,9 @@ def held(
     choices = holder_choices(free.mesh, target.triangles, turns, diameter, bores)[:MOST_HOLDERS]
     if end is not None:
         one = end_holder(free.mesh, target.triangles, turns, diameter, end.triangles)
-        choices = choices if one is None else [one._replace(keys={**one.keys, "at": end.at})]
+        choices = choices if one is None else [one.with_keys({"at": end.at})]
     why = "" if choices else NO_PLACE[bool(target.triangles.all())]
+    choices = [one._replace(keys=keys) for one in choices for keys in (one.keys, *one.thinner)]
     tried = [*product((HIDDEN, MOST_HIDDEN), choices)]
     for number, (hidden, one) in enumerate(tried):
         progress(number, len(tried), None)

@@ -109,7 +109,7 @@ def _clamp(made: Proposal) -> Clamp:
     corners = part.vertices[part.triangles]
     is_beyond = ((corners < low) | (corners > high)).any(axis=(1, 2))
     outside = np.where(is_beyond & ~part.target, part.area - chamber.exposed_area, 0.0)
-    jaws = _flat_jaws(part.vertices, part.triangles, outside)
+    jaws = flat_jaws(part.vertices, part.triangles, outside)
     if jaws.text and not jaws.is_shallow:
         return jaws
     known = [
@@ -168,7 +168,7 @@ def _is_round(corners: np.ndarray, outside: np.ndarray, axis: int) -> bool:
     return bool(off < OFF_ROUND * radius and is_even and is_outer and is_long)
 
 
-def _flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) -> Clamp:
+def flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) -> Clamp:
     """Return the largest two flat faces, back to back, that stand out of a chamber.
 
     The text is empty where there are none as large as jaws take.

@@ -23,6 +23,7 @@ import numpy as np
 
 from chamberopt.chamber.fixture import OF_FACE
 from chamberopt.chamber.propose.proposed_arbor import Bore, arbor_through, carries
+from chamberopt.chamber.propose.proposed_clamp import flat_jaws
 from chamberopt.chamber.propose.proposed_end import UPRIGHT, box_beyond
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.cut import cut_at_box, facets
@@ -39,6 +40,7 @@ from chamberopt.geometry.outline import (
 from chamberopt.geometry.thickness import depth_below
 from chamberopt.geometry.triangles import (
     area_vectors,
+    areas,
     centre_of_mass,
     rotation_matrix,
     unit_normals,
@@ -59,7 +61,9 @@ WIDER, SHORTEST, LONGEST = 2.0, 0.25, 0.4
 TIP, STRAIGHT = 0.1, 0.8
 PINS = "expanding pins, drawn from behind, in its"
 POTTED = "NO STRAIGHT END TO CLAMP: give jaws its form, or cast it into the block with polyurethane"
-WALL = 2e-3  # m: of a collar or block round an end
+# Thickness of a collar's or block's walls round an end: a share of its width, within [m], and where
+# there is no room for that, as thick as jaws with screws may be, and as a cap that is drilled.
+OF_WIDTH, THICKEST, WALLS = 0.25, 10e-3, (5e-3, 2e-3)
 # An end is too thin to hold a part by if half of the metal between the jaws is thinner than this,
 # [m] or over the part's least size, and the centre of mass lies further beyond them than so many
 # lengths of the grip. Metal is measured to so much [m]; sides of an end lean by less than a cosine.
@@ -82,11 +86,21 @@ class HolderChoice(NamedTuple):
     reason: str
     pins: tuple[dict[str, Any], ...] = ()  # entries of `faces`: walls of holes that pins fill
     is_thin: bool = False  # whether it grips metal too thin for what stands out of it
+    narrows: bool = (
+        False  # whether the end narrows so much to its tip that a bore does not clamp it
+    )
+    # Its keys with thinner walls round an end, the thickest first, for where room is scarce.
+    thinner: tuple[dict[str, Any], ...] = ()
 
     @property
     def is_round_an_end(self) -> bool:
         """Whether it encloses an end of the part."""
         return "grip_mm" in self.keys
+
+    def with_keys(self, keys: dict[str, Any]) -> HolderChoice:
+        """Return the holder with further keys, whatever its walls are."""
+        thinner = tuple({**one, **keys} for one in self.thinner)
+        return self._replace(keys={**self.keys, **keys}, thinner=thinner)
 
 
 class _Seen(NamedTuple):
@@ -239,10 +253,15 @@ def _told(
     Args:
         posed, triangles, axis: those of _gripped.
     """
-    thin = thin_grip(posed, triangles, axis, 1e-3 * choice.keys["grip_mm"])
-    if thin is None:
-        return choice
-    return choice._replace(reason=f"{choice.reason}; {thin.text}", is_thin=True)
+    grip, words = 1e-3 * choice.keys["grip_mm"], [choice.reason]
+    if choice.narrows:
+        end = _gripped(posed, triangles, axis, grip)
+        area = np.where(end.sides, areas(end.vertices, end.triangles), 0.0)
+        jaws = flat_jaws(end.vertices @ frame_along(axis), end.triangles, area)
+        words.append(jaws.text if jaws.text and not jaws.is_shallow else POTTED)
+    thin = thin_grip(posed, triangles, axis, grip)
+    words += [thin.text] if thin is not None else []
+    return choice._replace(reason="; ".join(words), is_thin=thin is not None)
 
 
 class _OnFace(NamedTuple):
@@ -301,7 +320,7 @@ def _on_flat_faces(
                 bolts = [] if made.is_round_an_end else _bolts(seen, made, holes)
                 reason = f"{made.reason}{_in_words(bolts)}"
                 pins = tuple(one.wall for one in bolts if one.is_in_target)
-                choice = HolderChoice({**made.keys, **at}, reason, pins)
+                choice = made.with_keys(at)._replace(reason=reason, pins=pins)
                 if made.is_round_an_end:
                     choice = _told(choice, posed, mesh.triangles, along)
                 yield _OnFace(choice, axis, float(round(1e3 * seen.level)))
@@ -402,8 +421,7 @@ def _jaw(
     if made is None:
         return None
     box = box_beyond(mesh, k, of_file[k] > 0.0, 1e3 * cut * np.sign(of_file[k]))
-    keys = {**made.keys, "at": {"box_mm": box}, **({} if up else {"axis": axis.tolist()})}
-    return made._replace(keys=keys)
+    return made.with_keys({"at": {"box_mm": box}, **({} if up else {"axis": axis.tolist()})})
 
 
 def end_holder(
@@ -466,16 +484,18 @@ def _around_end(seen: _Seen) -> HolderChoice | None:
     if grip < SHORTEST * needed.min() or grip <= 0.0:
         return None
     tip = 2.0 * aside[highest > level - TIP * grip].max(axis=0, initial=0.0)
-    outside = [math.ceil(2e3 * (one + 2.0 * WALL) - 1e-6) / 2.0 for one in needed]
-    size = {"diameter_mm": outside[0]} if is_round else {"size_mm": outside}
+    usual = min(max(OF_WIDTH * float(needed.min()), WALLS[0]), THICKEST)
+    sizes = []
+    for wall in dict.fromkeys((usual, *WALLS)):
+        outside = [math.ceil(2e3 * (one + 2.0 * wall) - 1e-6) / 2.0 for one in needed]
+        sizes.append({"diameter_mm": outside[0]} if is_round else {"size_mm": outside})
     beyond = plain(1e3 * (level - grip - target_top), 2)
     text = f"round the end that points {seen.where}, which is not peened; the target begins"
-    if (tip < STRAIGHT * needed).any():
-        beyond += f" mm beyond it; {POTTED}"
-    else:
-        beyond += " mm beyond it"
-    keys = {"kind": "collar" if is_round else "plate", **size, "grip_mm": round(1e3 * grip, 1)}
-    return HolderChoice(keys, f"{text} {beyond}")
+    kind, grip_mm = "collar" if is_round else "plate", round(1e3 * grip, 1)
+    first, *thinner = ({"kind": kind, **size, "grip_mm": grip_mm} for size in sizes)
+    narrows = bool((tip < STRAIGHT * needed).any())
+    reason = f"{text} {beyond} mm beyond it"
+    return HolderChoice(first, reason, thinner=tuple(thinner), narrows=narrows)
 
 
 def _block(seen: _Seen, area: float, long: float) -> HolderChoice | None:
