@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chamberopt.chamber.checks.fillets import AS_DRAWN, OF_FILLET, OF_SLOT, inner_edges
+from chamberopt.chamber.checks.fillets import AS_DRAWN, OF_FILLET, OF_SLOT, inner_edges, too_narrow
 from chamberopt.chamber.checks.jams import JAM_BAND, MAX_COSINE, MIN_AREA
 from chamberopt.chamber.largest_ball import largest_balls, spread_points
 from chamberopt.chamber.part import Part
@@ -131,7 +131,7 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
             across = np.where((obstacle >= 0) & (cosine < MAX_COSINE), 2.0 * radius, np.inf)
             width = across - overlap
         in_slot = on & (across < one / OF_SLOT)
-        small = round_ & (OF_FILLET * edges.radius < AS_DRAWN * one)
+        small = round_ & too_narrow(edges, size, one)
         held = (width >= JAM_BAND[0] * one) & (width <= JAM_BAND[1] * one)
         jams = area[held].sum() >= MIN_AREA * one**2
         off = np.minimum(GAP_OFF * width, MOST_GAP_OFF)

@@ -9,10 +9,10 @@ from shapely import Polygon
 
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.proposal import Wanted
-from chamberopt.chamber.propose.proposed_balls import SizeFit, fit_sizes, propose_ball
+from chamberopt.chamber.propose.proposal import Wanted, sonotrode_area
+from chamberopt.chamber.propose.proposed_balls import SizeFit, charge_of, fit_sizes, propose_ball
 from chamberopt.chamber.propose.proposed_intensity import with_thin_places
-from chamberopt.chamber.propose.text import clauses
+from chamberopt.chamber.propose.text import clauses, to_settle
 from chamberopt.geometry.triangles import areas
 
 
@@ -178,3 +178,18 @@ def test_a_size_that_may_jam_gives_way_to_one_that_serves_nearly_as_much(
     assert "all sizes from 1.05 mm to 1.4 mm would jam" in reason
     play = [one for one in clauses(reason)[1] if one.startswith("PLAY OF")]
     assert len(play) == (chosen == 0.5)
+
+
+@pytest.mark.parametrize(("ball_mm", "is_cut"), [(0.2, True), (1.0, False)])
+def test_a_charge_that_is_cut_for_the_simulation_is_told_in_full(
+    ball_mm: float, is_cut: bool, tmp_path: Path
+) -> None:
+    trimesh.creation.box((50, 40, 10)).export(tmp_path / "block.stl")
+    made = propose(tmp_path / "block.stl", Wanted("mm", ball_mm=ball_mm), lambda _: [])
+    assert sonotrode_area(made.chamber) > 1e-3
+    told = [one for one in to_settle(made, []) if one.startswith("CHARGE IS CUT")]
+    assert len(told) == made.is_capped == is_cut
+    if is_cut:
+        full = charge_of(sonotrode_area(made.chamber), 1e-3 * ball_mm)
+        assert f"half a layer is {round(full):,} balls" in told[0]
+        assert made.design.shot.count < 0.7 * full
