@@ -28,7 +28,13 @@ from chamberopt.chamber.propose.proposed_arbor import Bore
 from chamberopt.chamber.propose.proposed_end import HeldEnd
 from chamberopt.chamber.propose.proposed_floor import Floor
 from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices, thin_grip
-from chamberopt.chamber.propose.proposed_mask import are_holes, pads, to_be_masked, to_be_plugged
+from chamberopt.chamber.propose.proposed_mask import (
+    are_holes,
+    pads,
+    rows_of,
+    to_be_masked,
+    to_be_plugged,
+)
 from chamberopt.chamber.propose.proposed_sizes import LONG
 from chamberopt.chamber.propose.proposed_target import Target
 from chamberopt.chamber.shop import Shop
@@ -41,6 +47,7 @@ CLEAR = 1.5  # distance of a mask from the target, over the diameter of a ball
 # Share of the target that a holder may keep from the balls; where no other holds the part.
 HIDDEN, MOST_HIDDEN = 0.005, 0.03
 LEAST_LEFT, MOST_LEFT = 0.005, 0.15  # share of the target that is left out if no ball touches it
+MOSTLY, WHOLE = 0.5, 0.9  # share of what is left out, and of the target that names nothing of it
 NO_PLACE = (
     "no flat face beside the target looks up or aside and has room for a holder",
     "all of it is to be peened; leave out of [part.target] the face to hold it by",
@@ -199,8 +206,9 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     left = np.where(part.target, (1.0 - share) * part.area, 0.0)
     place = one_of(part.vertices[part.triangles].mean(axis=1), left)
     text = (
-        f"PLACES ARE LEFT OUT, {left_out:.1%} of the target, which balls hardly touch here, such "
-        f"as at {place} in the chamber: agree on it, or take smaller balls (--ball-mm)"
+        f"PLACES ARE LEFT OUT, {left_out:.1%} of the target, {_where_left(made, left)}which balls "
+        f"hardly touch here, such as at {place} in the chamber: agree on it, or take smaller balls "
+        "(--ball-mm)"
     )
     if (radius := _narrow_fillets(made, left)) > 0.0:
         text = (
@@ -209,6 +217,28 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
             f"than {2e3 * radius:.2g} mm (--ball-mm), or agree on it"
         )
     return replace(narrowed, reasons={**narrowed.reasons, "part.target.reachable": text})
+
+
+def _where_left(made: Proposal, left: np.ndarray) -> str:
+    """Return words for what most of that is which is left out: a surface, and whether it is hollow.
+
+    Args:
+        left: that of _narrow_fillets.
+    """
+    part, words, most = made.chamber.part, [], MOSTLY * left.sum()
+    target = float(part.area[part.target].sum())
+    found = []
+    for one in made.known:
+        rows = rows_of(made.design, one.keys)
+        size = float(part.area[rows & part.target].sum())
+        if left[rows].sum() > most and size < WHOLE * target:
+            found.append((size, one.name))
+    if found:
+        words.append(f"on {min(found)[1]}")
+    if part.hollow is not None and left[hollow := part.hollow > 0.0].sum() > most:
+        radius = 1.0 / float(np.average(part.hollow[hollow], weights=left[hollow]))
+        words.append(f"in hollows of about {1e3 * radius:.2g} mm")
+    return f"mostly {' '.join(words)}, " if words else ""
 
 
 def _narrow_fillets(made: Proposal, left: np.ndarray) -> float:

@@ -66,6 +66,7 @@ COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 
 BY_PROGRAM = re.compile(r"(?:created|exported|generated|written)[\s_-]+(?:by|from|with)\b", re.I)
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
 FACE = re.compile(r"face (\d+)", re.I)
+AROUND = 0.1  # share of the fillets' area from which on a face is one in which they lie
 SAME_RADIUS = 0.02  # relative difference of radii below which fillets are of one radius
 MOST_NAMED = 5  # surfaces of a target that are named; of more, the first are
 Keys = dict[str, Any]
@@ -200,7 +201,8 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         others = [one for one in faces if one not in pattern]
         return _joined(pattern, f"{text}{beside(others)}; {BY_SHAPE}")
     if fillets:
-        text = f"by their shape, as such are usually peened{beside(faces)}; {BY_SHAPE}"
+        text = f"by their shape, as such are usually peened{beside(faces)}"
+        text += f"{_around(fillets, faces, area)}; {BY_SHAPE}"
         return replace(_joined(fillets, text), fillets=tuple(fillets))
     sizes = [area[one.triangles].sum() for one in faces]
     large = [one for one, size in zip(faces, sizes, strict=True) if size >= AS_LARGE * sizes[0]]
@@ -210,6 +212,22 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         if one is large[0] or not is_inside_of_tube(mesh.vertices, own[one.triangles])
     ]
     return _joined(large, by_size("the largest between sharp edges", faces[len(large) :]))
+
+
+def _around(fillets: Sequence[Surface], faces: Sequence[Surface], area: np.ndarray) -> str:
+    """Return words for the faces that go on smoothly from some fillets, if they are much larger.
+
+    Args:
+        faces: faces between sharp edges.
+        area: of the part's triangles [m²], (m,).
+    """
+    own = np.any([one.triangles for one in fillets], axis=0)
+    size = float(area[own].sum())
+    beside = [one for one in faces if area[own & one.triangles].sum() > AROUND * size]
+    if not beside or sum(area[one.triangles].sum() for one in beside) < 2.0 * size:
+        return ""
+    asked = " ".join(f'--target "{one.name}"' for one in beside[:MOST_NAMED])
+    return f"; with all of the surfaces that they lie in: {asked}"
 
 
 def fewer_fillets(mesh: PartMesh, target: Target) -> list[Target]:

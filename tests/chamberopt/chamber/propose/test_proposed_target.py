@@ -11,6 +11,7 @@ from chamberopt.chamber.propose.proposed_target import (
     CREASE_DEG,
     Surface,
     Target,
+    _around,
     crease_deg,
     fewer_fillets,
     propose_target,
@@ -165,3 +166,18 @@ def test_fillets_near_the_heavier_end_are_left_out_first(count: int, root_up: bo
         assert (one.triangles == np.any([x.triangles for x in fillets[out:]], axis=0)).all()
         assert all(f'--target "{x.name}"' in one.reason for x in fillets[:out])
         assert not any(f'--target "{x.name}"' in one.reason for x in fillets[out:])
+
+
+@pytest.mark.parametrize(("wide", "is_told"), [(5.0, True), (0.3, False)])
+def test_the_surfaces_in_which_fillets_lie_are_named(wide: float, is_told: bool) -> None:
+    """A fillet of 1 mm² lies in two faces, each so many times as large."""
+    area = np.array([0.5, 0.5, wide, wide, 30.0])
+
+    def surface(name: str, *rows: int) -> Surface:
+        return Surface(name, {}, np.isin(np.arange(5), rows), "")
+
+    faces = [surface("face 1", 4), surface("face 2", 0, 2), surface("face 3", 1, 3)]
+    words = _around([surface("fillets", 0, 1)], faces, area)
+    assert words.endswith('--target "face 2" --target "face 3"') == is_told
+    assert "face 1" not in words
+    assert is_told or not words
