@@ -27,6 +27,8 @@ GRID_MM = 2.0**-20
 PLANE_MM, PLANE_OF_SIZE = 1e-5, 3e-7
 # Relative. A failed boolean is off by whole triangles, and rounding by 1e-13.
 SAME_VOLUME = 1e-9
+# Share of an opening's area by which what passes it may stand over it, and facets of a round.
+THROUGH, ROUND_FACETS = 1e-3, 64
 
 
 @dataclass(frozen=True)
@@ -241,6 +243,35 @@ def plan_outline(vertices: np.ndarray, triangles: np.ndarray, below: float) -> O
         for one in split_bodies(vertices, triangles, "the part")[0]
     ]
     return Outline(CrossSection.batch_boolean(sections, OpType.Add))
+
+
+def passes_opening(
+    vertices: np.ndarray, triangles: np.ndarray, level: float, clear: float
+) -> tuple[bool, bool]:
+    """Return whether all below a level, and all above it, fit through the section of bodies there.
+
+    The normals of the surface point outward.
+
+    Args:
+        level: height of the section [m].
+        clear: room round the section [m].
+    """
+    from manifold3d import CrossSection, OpType
+
+    bodies = [one.body for one in split_bodies(vertices, triangles, "the part")[0]]
+
+    def joined(sections: list[CrossSection]) -> CrossSection:
+        own = [CrossSection(one.to_polygons()) for one in sections]
+        return CrossSection.batch_boolean(own, OpType.Add)
+
+    opening = Outline(joined([one.slice(1e3 * level) for one in bodies]))
+    wide = opening.offset(clear, ROUND_FACETS).section
+    least = THROUGH * opening.section.area()
+    below, above = (
+        joined([one.trim_by_plane((0.0, 0.0, up), 1e3 * up * level).project() for one in bodies])
+        for up in (-1.0, 1.0)
+    )
+    return (below - wide).area() <= least, (above - wide).area() <= least
 
 
 def extrude(outline: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray]:

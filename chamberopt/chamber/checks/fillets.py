@@ -98,7 +98,10 @@ AS_DRAWN = 0.98  # of a drawn radius, which is that of facets to so much
 LEAST_TURN, SHARP = 1.0, 60.0  # least and largest turn at an inner edge of a fillet [degrees]
 FOLD = 15.0  # degrees: an inner edge that turns by more is a fillet, even with a single facet
 HOLLOW = 1.0 / 3.0  # least inward less outward turn near an edge of a fillet, over the whole turn
-SMALLEST = 0.05  # share of the inner edges' length, or the slots' area, that may be smaller
+# What is narrower than the rest of a fillet, as a curl at its end, does not count below this share
+# of the area of all fillets that are up to so many times as wide as the shot takes.
+CURL, FILLETS_ALIKE = 0.01, 10.0
+SMALLEST = 0.05  # share of the area beside inner edges, or of the slots', that may be smaller
 MAX_POINTS = 5000  # surface points at which slots are searched
 
 
@@ -175,6 +178,27 @@ def inner_edges(
     return InnerEdges(ends.mean(axis=1)[inner], length[inner], radius, beside)
 
 
+def too_narrow(edges: InnerEdges, area: np.ndarray, ball: float) -> np.ndarray:
+    """Return which inner edges are too narrow for a ball, (e,): their fillets, or without one.
+
+    Fillets do not count that are a tiny share of the area of all.
+
+    Args:
+        area: of the part's triangles [m²], (m,).
+        ball: diameter of the ball [m].
+    """
+    limit = AS_DRAWN * ball / OF_FILLET
+    small, is_round = edges.radius < limit, edges.radius > 0.0
+
+    def area_beside(rows: np.ndarray) -> float:
+        return float(area[np.unique(edges.triangles[rows])].sum())
+
+    alike = is_round & (edges.radius < FILLETS_ALIKE * limit)
+    if area_beside(small & is_round) < CURL * area_beside(alike):
+        return small & ~is_round
+    return small
+
+
 def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Return how much the surface turns across each edge [m rad], summed over edges at its ends.
 
@@ -201,11 +225,13 @@ def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.nda
 
 def _fillets(chamber: Chamber, chosen: np.ndarray, largest: float) -> list[DesignWarning]:
     part = chamber.part
-    middle, length, radius, _ = inner_edges(part.vertices, part.triangles, chosen, part.hollow)
-    small = radius * OF_FILLET < AS_DRAWN * largest
+    edges = inner_edges(part.vertices, part.triangles, chosen, part.hollow)
+    middle, length, radius, _ = edges
+    small = too_narrow(edges, part.area, largest)
     if length[small].sum() < largest:  # a fillet is longer than a ball
         return []
-    smallest = _low_quantile(radius[small], length[small])
+    beside = part.area[edges.triangles].sum(axis=1)
+    smallest = _low_quantile(radius[small], beside[small])
     fillet = f"fillets of about {1e3 * smallest:.2g} mm" if smallest else "inner edges without one"
     where = f"{one_of(middle[small], length[small])} in the chamber's frame"
     text = (

@@ -20,6 +20,7 @@ from chamberopt.chamber.propose.held_proposal import (
     hangs_by_a_face,
     held,
     is_firm,
+    is_held_thinly,
     masked,
     only_touched,
     padded,
@@ -27,6 +28,7 @@ from chamberopt.chamber.propose.held_proposal import (
 )
 from chamberopt.chamber.propose.pose import (
     AT_SIDE,
+    Pose,
     Turns,
     end_to_wall,
     hanging_pose,
@@ -76,7 +78,13 @@ from chamberopt.chamber.propose.proposed_floor import (
     require_room,
 )
 from chamberopt.chamber.propose.proposed_sizes import middle_in_plan, propose_sizes, shape_for
-from chamberopt.chamber.propose.proposed_target import Surface, Target, propose_target, surfaces
+from chamberopt.chamber.propose.proposed_target import (
+    Surface,
+    Target,
+    fewer_fillets,
+    propose_target,
+    surfaces,
+)
 from chamberopt.chamber.shop import HARD, STEEL, Shop, usual_shop
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import step
@@ -122,6 +130,7 @@ CUT_OUT = "plates, cut out round it"
 OWN_WALL, OWN_LID = "the part itself is the wall", f"the part itself is the lid: {CUT_OUT}"
 START = "NOT MEASURED by a pilot, a start"
 FEWER = "so that a strip of it takes few sonotrodes"
+NOT_THIN = "so that it is held by an end of thicker metal"
 ON_END = "on end, as no single sonotrode is large enough for it lying"
 
 
@@ -153,6 +162,8 @@ def propose(
         return _lying(path, wanted, mesh, known, target, turns, pose_reason, keeps_target)
     end = None if keeps_target else held_end(mesh, target, turns)
     made = _proposed(path, wanted, mesh, known, target, turns, pose_reason, end)
+    if wanted.pose is None and is_held_thinly(made):
+        return _held_otherwise(path, wanted, mesh, known, target, made)
     if end is not None and "holder" not in made.tables:  # nothing holds the end: it is peened too
         return _proposed(path, wanted, mesh, known, target, turns, pose_reason, None)
     if keeps_target or wanted.pose or end is not None or not hangs_by_a_face(made):
@@ -164,6 +175,44 @@ def propose(
             if "holder" in other.tables and faults(other) <= faults(made):
                 return other
     return made
+
+
+def _held_otherwise(
+    path: Path,
+    wanted: Wanted,
+    mesh: PartMesh,
+    known: Sequence[Surface],
+    target: Target,
+    made: Proposal,
+) -> Proposal:
+    """Return a proposal in whose pose, or with fewer fillets as its target, an end holds the part.
+
+    Args:
+        made: the proposal for all of the target, whose holder grips an end of thin metal. It is
+            returned where nothing else holds the part better.
+    """
+
+    def in_pose(pose: Pose) -> tuple[Target, Turns, str]:
+        turns = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, pose)
+        return target, turns, NOT_THIN
+
+    fewer = [
+        (one, *propose_pose(mesh.vertices, mesh.triangles, one.triangles))
+        for one in fewer_fillets(mesh, target)
+    ]
+    second: Proposal | None = None  # on which balls would come to rest
+    for one, turns, why in (in_pose("standing"), *fewer, *map(in_pose, AT_SIDE)):
+        if one is target and turns[:2] == made.design.part.rotate_deg[:2]:
+            continue
+        with suppress(InputError):
+            other = _proposed(path, wanted, mesh, known, one, turns, why, None)
+            is_held = is_firm(other) and not grips_poorly(other) and not is_held_thinly(other)
+            if not is_held or len(other.jams) > len(made.jams):
+                continue
+            if not rests(other):
+                return other
+            second = second or other
+    return second or made
 
 
 def _lying(

@@ -28,8 +28,14 @@ from chamberopt.chamber.propose.proposal import (
 from chamberopt.chamber.propose.proposed_arbor import Bore
 from chamberopt.chamber.propose.proposed_end import HeldEnd
 from chamberopt.chamber.propose.proposed_floor import Floor
-from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices
-from chamberopt.chamber.propose.proposed_mask import are_holes, pads, to_be_masked, to_be_plugged
+from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices, thin_grip
+from chamberopt.chamber.propose.proposed_mask import (
+    are_holes,
+    pads,
+    rows_of,
+    to_be_masked,
+    to_be_plugged,
+)
 from chamberopt.chamber.propose.proposed_sizes import LONG
 from chamberopt.chamber.propose.proposed_target import Target
 from chamberopt.chamber.shop import Shop
@@ -42,6 +48,7 @@ CLEAR = 1.5  # distance of a mask from the target, over the diameter of a ball
 # Share of the target that a holder may keep from the balls; where no other holds the part.
 HIDDEN, MOST_HIDDEN = 0.005, 0.03
 LEAST_LEFT, MOST_LEFT = 0.005, 0.15  # share of the target that is left out if no ball touches it
+MOSTLY, WHOLE = 0.5, 0.9  # share of what is left out, and of the target that names nothing of it
 NO_PLACE = (
     "no flat face beside the target looks up or aside and has room for a holder",
     "all of it is to be peened; leave out of [part.target] the face to hold it by",
@@ -68,8 +75,9 @@ def held(
     choices = holder_choices(free.mesh, target.triangles, turns, diameter, bores)[:MOST_HOLDERS]
     if end is not None:
         one = end_holder(free.mesh, target.triangles, turns, diameter, end.triangles)
-        choices = choices if one is None else [one._replace(keys={**one.keys, "at": end.at})]
+        choices = choices if one is None else [one.with_keys({"at": end.at})]
     why = "" if choices else NO_PLACE[bool(target.triangles.all())]
+    choices = [one._replace(keys=keys) for one in choices for keys in (one.keys, *one.thinner)]
     tried = [*product((HIDDEN, MOST_HIDDEN), choices)]
     for number, (hidden, one) in enumerate(tried):
         progress(number, len(tried), None)
@@ -99,6 +107,17 @@ def is_firm(made: Proposal) -> bool:
     """Return whether a holder holds the part by itself, as one that stands on a face does not."""
     holder = made.design.holder
     return holder is not None and (holder.kind in ("arbor", "bore") or holder.grip_mm is not None)
+
+
+def is_held_thinly(made: Proposal) -> bool:
+    """Return whether a holder grips an end that is too thin for what stands out of it."""
+    holder, part = made.design.holder, made.chamber.part
+    if holder is None or holder.grip_mm is None:
+        return False
+    axis = np.array(holder.axis, dtype=float)
+    axis /= np.linalg.norm(axis)
+    grip = 1e-3 * holder.grip_mm
+    return thin_grip(part.vertices, part.triangles, axis, grip) is not None
 
 
 def rests(made: Proposal) -> bool:
@@ -188,8 +207,9 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     left = np.where(part.target, (1.0 - share) * part.area, 0.0)
     place = one_of(part.vertices[part.triangles].mean(axis=1), left)
     text = (
-        f"PLACES ARE LEFT OUT, {left_out:.1%} of the target, which balls hardly touch here, such "
-        f"as at {place} in the chamber: agree on it, or take smaller balls (--ball-mm)"
+        f"PLACES ARE LEFT OUT, {left_out:.1%} of the target, {_where_left(made, left)}which balls "
+        f"hardly touch here, such as at {place} in the chamber: agree on it, or take smaller balls "
+        "(--ball-mm)"
     )
     if (radius := _narrow_fillets(made, left)) > 0.0:
         text = (
@@ -198,6 +218,28 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
             f"than {2e3 * radius:.2g} mm (--ball-mm), or agree on it"
         )
     return replace(narrowed, reasons={**narrowed.reasons, "part.target.reachable": text})
+
+
+def _where_left(made: Proposal, left: np.ndarray) -> str:
+    """Return words for what most of that is which is left out: a surface, and whether it is hollow.
+
+    Args:
+        left: that of _narrow_fillets.
+    """
+    part, words, most = made.chamber.part, [], MOSTLY * left.sum()
+    target = float(part.area[part.target].sum())
+    found = []
+    for one in made.known:
+        rows = rows_of(made.design, one.keys)
+        size = float(part.area[rows & part.target].sum())
+        if left[rows].sum() > most and size < WHOLE * target:
+            found.append((size, one.name))
+    if found:
+        words.append(f"on {min(found)[1]}")
+    if part.hollow is not None and left[hollow := part.hollow > 0.0].sum() > most:
+        radius = 1.0 / float(np.average(part.hollow[hollow], weights=left[hollow]))
+        words.append(f"in hollows of about {1e3 * radius:.2g} mm")
+    return f"mostly {' '.join(words)}, " if words else ""
 
 
 def _narrow_fillets(made: Proposal, left: np.ndarray) -> float:

@@ -202,7 +202,8 @@ def pose_in_words(mesh: PartMesh, known: Sequence[Surface], turns: Turns) -> str
         turned = [f"{turns[k]:.4g} degrees about {'xy'[k]}" for k in (0, 1) if turns[k]]
         words.append(tilted[0] if tilted else f"turned by {', then '.join(turned)}")
     if turns[2]:
-        words.append(f"turned by {turns[2]:.4g} degrees about the vertical")
+        way = ", clockwise as seen from above" if turns[2] < 0.0 else ""
+        words.append(f"turned by {abs(turns[2]):.4g} degrees about the vertical{way}")
     return ", ".join(words)
 
 

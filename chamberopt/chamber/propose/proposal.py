@@ -183,6 +183,12 @@ def checked(
     tables["tolerances"] = propose_tolerances(tables)
     design = validate(Design, nested(tables))
     in_words = {"shot.mass_g": f"{charge.reason}: {design.shot.count}", "tolerances": OF_LENGTHS}
+    if charge.is_capped:
+        full_g = float(f"{1e3 * charge.full * ball_mass:.2g}")
+        in_words["shot.mass_g"] += (
+            f"; CHARGE IS CUT for the simulation, which takes hours with more: half a layer is "
+            f"{charge.full:,} balls, {full_g:g} g, and a shop takes it (shot.mass_g)"
+        )
     if beside is not None and not chamber.steps:
         at_once = first_warnings(design, chamber, chamber_mesh(chamber))
         if harm := _first_new(at_once, beside):
@@ -301,7 +307,13 @@ class Charge(NamedTuple):
 
     mass_g: float  # to two digits
     reason: str
-    is_capped: bool = False  # true if it is less than it should be, as more take too long
+    # Balls of half a layer if the proposed mass is less, as more take too long; else 0.
+    full: int = 0
+
+    @property
+    def is_capped(self) -> bool:
+        """Whether it is less than it should be, as more take too long."""
+        return self.full > 0
 
 
 def propose_charge(floor: float, diameter: float, ball_mass: float) -> Charge:
@@ -318,8 +330,7 @@ def propose_charge(floor: float, diameter: float, ball_mass: float) -> Charge:
         return Charge(most, "the most that is supported, less than half a layer of balls")
     mass = min(float(f"{wanted:.2g}"), most)
     if count < full:
-        text = "less than half a layer of balls, as more take hours to simulate"
-        return Charge(mass, text, is_capped=True)
+        return Charge(mass, "less than half a layer of balls", full)
     return Charge(mass, "half a layer of balls on the sonotrode")
 
 

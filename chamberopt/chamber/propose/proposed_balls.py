@@ -4,6 +4,8 @@ A ball of the diameter d serves a place of the target if it touches it, if it do
 fillet of less than 2 d radius (OF_FILLET) nor in a slot of less than 4 d (OF_SLOT), and if it is
 not held there by a gap of 0.9 d to 1.15 d (JAM_BAND). A smaller ball serves all that a larger one
 serves, but for gaps in which it jams: so a mix of two sizes serves no more than the better of them.
+A gap has a tolerance: a size whose jam band is reached within it gives way to one that serves
+nearly as much (NEARLY).
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chamberopt.chamber.checks.fillets import AS_DRAWN, OF_FILLET, OF_SLOT, inner_edges
+from chamberopt.chamber.checks.fillets import AS_DRAWN, OF_FILLET, OF_SLOT, inner_edges, too_narrow
 from chamberopt.chamber.checks.jams import JAM_BAND, MAX_COSINE, MIN_AREA
 from chamberopt.chamber.checks.usual import DEEPEST
 from chamberopt.chamber.largest_ball import largest_balls, spread_points
@@ -37,6 +39,10 @@ MOSTLY = 0.85
 MANY = 3000
 THIN_SHARE = 0.05  # of a target that may be thin
 OF_THIN = 1.5  # diameter of the largest balls over that depth, by heart
+# How far a gap may be off its width, as of coils or a slot: over the width, and at most [m], which
+# is that of ISO 2768-m up to 6 mm. Share of the target that a size may serve less than another
+# whose balls would jam within it.
+GAP_OFF, MOST_GAP_OFF, NEARLY = 0.15, 0.1e-3, 0.2
 MOST_LISTED = 5  # sizes in a reason
 LARGEST_BALL = 3e-3  # m: larger balls are in use, but they are few and slow to cover
 MOST_BALLS = 10_000  # of a charge: more take hours to simulate
@@ -56,6 +62,14 @@ class SizeFit:
     jam: float  # width of a gap of the part in which the ball jams [m]; 0 if there is none
     count: int  # of balls in a charge under the part
     fillets: float = 1.0  # share that it can touch of fillets so narrow that the largest may not
+    # Width of a gap in which the ball jams if the gap is as wide or as narrow as its tolerance
+    # lets it be [m]; 0 if there is none.
+    nearly_jam: float = 0.0
+
+    @property
+    def play(self) -> float:
+        """Width of that gap less the ball's diameter [m]; below 0 if the ball is larger."""
+        return self.nearly_jam - self.diameter
 
 
 def charge_of(area: float, diameter: float) -> float:
@@ -118,19 +132,25 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
             across = np.where((obstacle >= 0) & (cosine < MAX_COSINE), 2.0 * radius, np.inf)
             width = across - overlap
         in_slot = on & (across < one / OF_SLOT)
-        small = round_ & (OF_FILLET * edges.radius < AS_DRAWN * one)
+        small = round_ & too_narrow(edges, size, one)
         held = (width >= JAM_BAND[0] * one) & (width <= JAM_BAND[1] * one)
         jams = area[held].sum() >= MIN_AREA * one**2
+        off = np.minimum(GAP_OFF * width, MOST_GAP_OFF)
+        near = (width + off >= JAM_BAND[0] * one) & (width - off <= JAM_BAND[1] * one)
+        may_jam = area[near & ~held].sum() >= MIN_AREA * one**2
         touched = on & (radius >= 0.5 * one - overlap)
         served = touched & ~in_slot & (OF_FILLET * fillet[triangle] >= AS_DRAWN * one)
         suits = area[in_slot].sum() < one**2 and edges.length[small].sum() < one
         jam = float(np.average(width[held], weights=area[held])) if jams else 0.0
+        nearly = (
+            float(np.average(width[near & ~held], weights=area[near & ~held])) if may_jam else 0.0
+        )
         touch, serve = (float(area[rows].sum()) / whole for rows in (touched, served))
         count = round(charge_of(float(np.sort(np.ptp(part.vertices, axis=0))[1:].prod()), one))
         fillets = 1.0
         if of_narrow > LEAST_FILLETS * whole:
             fillets = float(area[touched & narrow].sum()) / of_narrow
-        fits.append(SizeFit(one, touch, serve, bool(suits), jam, count, fillets))
+        fits.append(SizeFit(one, touch, serve, bool(suits), jam, count, fillets, nearly))
     return fits
 
 
@@ -177,6 +197,7 @@ def serving_sizes(fits: Sequence[SizeFit]) -> list[float]:
         if one.diameter <= largest
         and one.count <= max(MANY, best.count)
         and (bool(best.jam) or not one.jam)
+        and (bool(best.nearly_jam) or not one.nearly_jam)
         and one.touched >= best.touched - MISSED
         and one.served >= best.served - AS_GOOD
     ]
@@ -202,6 +223,52 @@ def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
         fits: sizes in ascending order.
     """
     free = [one for one in fits if not one.jam] or list(fits)
+    best, text = _best_of(free, fits)
+    sure = [one for one in free if not one.nearly_jam]
+    if best.nearly_jam and not best.jam and sure:
+        other, its_text = _best_of(sure, fits)
+        if other.served >= best.served - NEARLY and other.fillets >= best.fillets - MISSED_FILLETS:
+            text = f"{its_text}; {_mm(best)} may jam in a gap of {1e3 * best.nearly_jam:.3g} mm"
+            best = other
+        else:
+            text += f"; {_of_play(best)}, or take {_mm(other)}, which serve {other.served:.0%}"
+    elif best.nearly_jam and not best.jam:
+        text += f"; {_of_play(best)}"
+    blunt = [one for one in fits if one.diameter > best.diameter]
+    if blunt and blunt[0].fillets < best.fillets - MISSED_FILLETS:
+        text += "; larger ones do not get into its fillets, where parts fail"
+    if best.jam:
+        text += f"; BALLS JAM in gaps of {1e3 * best.jam:.4g} mm, as every size does"
+    elif jammed := [number for number, one in enumerate(fits) if one.jam]:
+        first, last = fits[jammed[0]], fits[jammed[-1]]
+        listed = ", ".join(_mm(fits[number]) for number in jammed)
+        if len(jammed) == jammed[-1] - jammed[0] + 1 > MOST_LISTED:
+            listed = f"all sizes from {_mm(first)} to {_mm(last)}"
+        text += f"; {listed} would jam in gaps of the part"
+    return best.diameter, text
+
+
+def _of_play(one: SizeFit) -> str:
+    """Return what is to be settled of a gap in which balls jam within its tolerance."""
+    gap, ball = f"{1e3 * one.nearly_jam:.2g} mm", 1e3 * one.diameter
+    if one.play > 0.0:
+        return (
+            f"PLAY OF {1e3 * one.play:.2g} mm IN A GAP of {gap}: balls jam where it is narrower "
+            f"than {JAM_BAND[1] * ball:.3g} mm: measure it"
+        )
+    return (
+        f"BALLS MAY JAM IN A GAP of {gap}, where it is wider than {JAM_BAND[0] * ball:.3g} mm: "
+        "measure it"
+    )
+
+
+def _best_of(free: Sequence[SizeFit], fits: Sequence[SizeFit]) -> tuple[SizeFit, str]:
+    """Return the best of some sizes, and what is said of it.
+
+    Args:
+        free: those that may be taken, in ascending order.
+        fits: all sizes in ascending order.
+    """
     touching = max(one.touched for one in free) - MISSED
     reach = [one for one in free if one.touched >= touching]
     in_fillets = max((one.fillets for one in reach if one.count <= MANY), default=0.0)
@@ -228,14 +295,7 @@ def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
         shown = sorted({*fits[:: max(1, len(fits) // MOST_LISTED)], best}, key=lambda x: x.diameter)
         shares = ", ".join(f"{_mm(one)} {one.served:.0%}" for one in shown)
         text = f"NO SIZE SERVES ALL (fillets of 2, slots of 4 diameters); of the target: {shares}"
-    blunt = [one for one in fits if one.diameter > best.diameter]
-    if blunt and blunt[0].fillets < best.fillets - MISSED_FILLETS:
-        text += "; larger ones do not get into its fillets, where parts fail"
-    if best.jam:
-        text += f"; BALLS JAM in gaps of {1e3 * best.jam:.4g} mm, as every size does"
-    elif jammed := [one for one in fits if one.jam]:
-        text += f"; {', '.join(map(_mm, jammed[:MOST_LISTED]))} would jam in gaps of the part"
-    return best.diameter, text
+    return best, text
 
 
 def _mm(one: SizeFit) -> str:

@@ -22,6 +22,7 @@ from chamberopt.chamber.shop import Shop
 from chamberopt.design.fixture import WIDEST_GAP, tight_gap_mm
 from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.outline import convex_hull, fitted_circle, frame_along, narrowest_rectangle
+from chamberopt.geometry.solids import passes_opening
 from chamberopt.geometry.triangles import unit_normals
 
 MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
@@ -45,12 +46,14 @@ class Clamp(NamedTuple):
 
 def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     """Return a proposal whose part, which goes out of the chamber, is held where it does."""
-    keys = {"kind": "bore", "clearance_mm": bore_clearance_mm(made.design.shot.diameter)}
+    clearance_mm = bore_clearance_mm(made.design.shot.diameter)
+    keys = {"kind": "bore", "clearance_mm": clearance_mm}
     tables = with_table(made.tables, "sonotrode", "holder", keys)
     by = f" by {clamp.text}" if (clamp := _clamp(made)).text else ""
     text = (
         f"clamped where it stands out of the chamber at {', '.join(_sides_out(made))}{by}; the "
-        f"wall, cut out {keys['clearance_mm']:g} mm round it so that no ball passes, is split there"
+        f"wall, cut out {clearance_mm:g} mm round it so that no ball passes, "
+        f"{_mounting(made, 1e-3 * clearance_mm)}"
     )
     if _is_cut_all_round(made):
         text += (
@@ -60,6 +63,25 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
         )
     reasons = {**made.reasons, "holder.kind": text}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
+
+
+def _mounting(made: Proposal, clearance: float) -> str:
+    """Return how a part gets into a wall through which it goes out.
+
+    A ceiling is split only if neither what is below it nor what is above it passes its opening.
+
+    Args:
+        clearance: room between part and wall [m].
+    """
+    part = made.chamber.part
+    if _sides_out(made) == ["+z"] and "z" not in made.closed:
+        ceiling = float(made.chamber.vertices[:, 2].max())
+        below, above = passes_opening(part.vertices, part.triangles, ceiling, clearance)
+        if below:
+            return "is in one piece there: the part goes in from above"
+        if above:
+            return "is in one piece there: it is put over the part from above"
+    return "is split there"
 
 
 def grips_poorly(made: Proposal) -> bool:
@@ -109,7 +131,7 @@ def _clamp(made: Proposal) -> Clamp:
     corners = part.vertices[part.triangles]
     is_beyond = ((corners < low) | (corners > high)).any(axis=(1, 2))
     outside = np.where(is_beyond & ~part.target, part.area - chamber.exposed_area, 0.0)
-    jaws = _flat_jaws(part.vertices, part.triangles, outside)
+    jaws = flat_jaws(part.vertices, part.triangles, outside)
     if jaws.text and not jaws.is_shallow:
         return jaws
     known = [
@@ -168,7 +190,7 @@ def _is_round(corners: np.ndarray, outside: np.ndarray, axis: int) -> bool:
     return bool(off < OFF_ROUND * radius and is_even and is_outer and is_long)
 
 
-def _flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) -> Clamp:
+def flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) -> Clamp:
     """Return the largest two flat faces, back to back, that stand out of a chamber.
 
     The text is empty where there are none as large as jaws take.

@@ -23,8 +23,10 @@ import numpy as np
 
 from chamberopt.chamber.fixture import OF_FACE
 from chamberopt.chamber.propose.proposed_arbor import Bore, arbor_through, carries
+from chamberopt.chamber.propose.proposed_clamp import flat_jaws
 from chamberopt.chamber.propose.proposed_end import UPRIGHT, box_beyond
 from chamberopt.common.number_text import plain
+from chamberopt.geometry.cut import cut_at_box, facets
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import (
     centroid,
@@ -35,7 +37,14 @@ from chamberopt.geometry.outline import (
     narrowest_rectangle,
     radii,
 )
-from chamberopt.geometry.triangles import area_vectors, rotation_matrix
+from chamberopt.geometry.thickness import depth_below
+from chamberopt.geometry.triangles import (
+    area_vectors,
+    areas,
+    centre_of_mass,
+    rotation_matrix,
+    unit_normals,
+)
 
 FLAT_DEG = 1.0  # largest angle in a flat face: fillets beside it are no part of it
 ROUND_DEG = 25.0  # to the facets of a round beside one of them
@@ -52,7 +61,13 @@ WIDER, SHORTEST, LONGEST = 2.0, 0.25, 0.4
 TIP, STRAIGHT = 0.1, 0.8
 PINS = "expanding pins, drawn from behind, in its"
 POTTED = "NO STRAIGHT END TO CLAMP: give jaws its form, or cast it into the block with polyurethane"
-WALL = 2e-3  # m: of a collar or block round an end
+# Thickness of a collar's or block's walls round an end: a share of its width, within [m], and where
+# there is no room for that, as thick as jaws with screws may be, and as a cap that is drilled.
+OF_WIDTH, THICKEST, WALLS = 0.25, 10e-3, (5e-3, 2e-3)
+# An end is too thin to hold a part by if half of the metal between the jaws is thinner than this,
+# [m] or over the part's least size, and the centre of mass lies further beyond them than so many
+# lengths of the grip. Metal is measured to so much [m]; sides of an end lean by less than a cosine.
+THIN_METAL, THIN_SHARE, FAR_OUT, THICK, SIDEWAYS = 4e-3, 0.15, 3.0, 20e-3, 0.7
 THINNEST, SLIM = 2e-3, 0.15  # of a rod: m, and over the part's width: slim ones come last
 # Over the radius of a face: least seat of a rod round a hole in it, and least edge beside a target.
 SEAT, EDGE = 0.05, 0.3
@@ -70,11 +85,22 @@ class HolderChoice(NamedTuple):
     keys: dict[str, Any]
     reason: str
     pins: tuple[dict[str, Any], ...] = ()  # entries of `faces`: walls of holes that pins fill
+    is_thin: bool = False  # whether it grips metal too thin for what stands out of it
+    narrows: bool = (
+        False  # whether the end narrows so much to its tip that a bore does not clamp it
+    )
+    # Its keys with thinner walls round an end, the thickest first, for where room is scarce.
+    thinner: tuple[dict[str, Any], ...] = ()
 
     @property
     def is_round_an_end(self) -> bool:
         """Whether it encloses an end of the part."""
         return "grip_mm" in self.keys
+
+    def with_keys(self, keys: dict[str, Any]) -> HolderChoice:
+        """Return the holder with further keys, whatever its walls are."""
+        thinner = tuple({**one, **keys} for one in self.thinner)
+        return self._replace(keys={**self.keys, **keys}, thinner=thinner)
 
 
 class _Seen(NamedTuple):
@@ -110,8 +136,8 @@ def holder_choices(
     """Return the holders that may hold a part, the best first; none if nothing can carry one.
 
     What encloses an end that points up comes first, then arbors, what encloses an end at the side,
-    and rods on the highest faces. Then come rods at the side, of these first on faces opposite to
-    the target, then the thickest. Slim holders come last.
+    what encloses an end of thin metal, and rods on the highest faces. Then come rods at the side,
+    of these first on faces opposite to the target, then the thickest. Slim holders come last.
 
     Args:
         target: marks the triangles to be peened, (m,).
@@ -129,7 +155,9 @@ def holder_choices(
         up = "axis" not in one.keys
         place = 1.0 if one.keys["kind"] == "arbor" else 0.0 if up else 2.0
         if place != 1.0 and not one.is_round_an_end:
-            place = 3.0 + float(not up)
+            place = 4.0 + float(not up)
+        elif one.is_thin:
+            place = 3.0
         slim = one.keys["kind"] in ("rod", "arbor") and thick < SLIM * width
         found.append(((slim, place, *order, -thick), one))
 
@@ -143,6 +171,7 @@ def holder_choices(
         if any(axis @ other > UPRIGHT for other in closed):
             continue
         if (jaw := _jaw(mesh, target, turn, axis, CLEAR * ball)) is not None:
+            jaw = _told(jaw, posed, mesh.triangles, axis)
             opposite = axis @ away > OPPOSITE * np.linalg.norm(away)
             offer(jaw, float(not opposite), 1.0, thick=0.0)
     for one in on_faces:
@@ -152,6 +181,87 @@ def holder_choices(
         order = (-one.level_mm, 0.0) if "axis" not in keys else (float(not opposite), 0.0)
         offer(one.choice, *order, thick=thick)
     return [one for _, one in sorted(found, key=lambda one: one[0])]
+
+
+class ThinGrip(NamedTuple):
+    """A grip on an end that is too thin for the part that stands out of it."""
+
+    metal: float  # thickness of half of the metal between the jaws at most [m]
+    overhang: float  # of the centre of mass beyond the jaws [m]
+
+    @property
+    def text(self) -> str:
+        """What is to be settled."""
+        return (
+            f"THIN GRIP, on {1e3 * self.metal:.2g} mm of metal, with the centre of mass "
+            f"{1e3 * self.overhang:.2g} mm beyond the jaws: hold the part by another end, or take "
+            "a target that leaves one free (--target)"
+        )
+
+
+class _Gripped(NamedTuple):
+    """An end between jaws, seen along the axis in which it points, divided where they end."""
+
+    vertices: np.ndarray  # of the whole part [m], (n, 3), the last coordinate along the axis
+    triangles: np.ndarray  # (m, 3)
+    sides: np.ndarray  # marks those of the end's sides between the jaws, (m,)
+    level: float  # place of the jaws' lower end [m]
+
+
+def _gripped(posed: np.ndarray, triangles: np.ndarray, axis: np.ndarray, grip: float) -> _Gripped:
+    """Return the end of a part that points along an axis, between jaws.
+
+    Args:
+        posed, triangles: the part in its pose, (n, 3) [m] and (m, 3).
+        axis: unit vector in the chamber's frame, (3,).
+        grip: length of the end between the jaws [m].
+    """
+    seen = posed @ frame_along(axis).T
+    low, high = seen.min(axis=0) - 1e-3, seen.max(axis=0) + 1e-3
+    level = float(seen[:, 2].max()) - grip
+    low[2] = level
+    beyond = seen[triangles][..., 2].max(axis=1) > level
+    cut = cut_at_box(facets(seen, triangles), np.array([low, high]), beyond)
+    corners = cut.vertices[cut.triangles]
+    inside = corners[..., 2].mean(axis=1) > level
+    aside = np.abs(unit_normals(corners)[:, 2]) < SIDEWAYS
+    return _Gripped(cut.vertices, cut.triangles, inside & aside, level)
+
+
+def thin_grip(
+    posed: np.ndarray, triangles: np.ndarray, axis: np.ndarray, grip: float
+) -> ThinGrip | None:
+    """Return how thin the end is that a holder grips, if it is too thin for the part; else None.
+
+    Args:
+        posed, triangles, axis, grip: those of _gripped.
+    """
+    beyond = float((posed @ axis).max()) - grip - float(centre_of_mass(posed, triangles) @ axis)
+    if beyond <= FAR_OUT * grip:
+        return None
+    end = _gripped(posed, triangles, axis, grip)
+    metal = depth_below(end.vertices, end.triangles, end.sides, 0.5, THICK)
+    least = max(THIN_METAL, THIN_SHARE * float(np.ptp(posed, axis=0).min()))
+    return ThinGrip(metal, beyond) if metal < least else None
+
+
+def _told(
+    choice: HolderChoice, posed: np.ndarray, triangles: np.ndarray, axis: np.ndarray
+) -> HolderChoice:
+    """Return the choice of a holder round an end with what is said of its grip.
+
+    Args:
+        posed, triangles, axis: those of _gripped.
+    """
+    grip, words = 1e-3 * choice.keys["grip_mm"], [choice.reason]
+    if choice.narrows:
+        end = _gripped(posed, triangles, axis, grip)
+        area = np.where(end.sides, areas(end.vertices, end.triangles), 0.0)
+        jaws = flat_jaws(end.vertices @ frame_along(axis), end.triangles, area)
+        words.append(jaws.text if jaws.text and not jaws.is_shallow else POTTED)
+    thin = thin_grip(posed, triangles, axis, grip)
+    words += [thin.text] if thin is not None else []
+    return choice._replace(reason="; ".join(words), is_thin=thin is not None)
 
 
 class _OnFace(NamedTuple):
@@ -210,7 +320,9 @@ def _on_flat_faces(
                 bolts = [] if made.is_round_an_end else _bolts(seen, made, holes)
                 reason = f"{made.reason}{_in_words(bolts)}"
                 pins = tuple(one.wall for one in bolts if one.is_in_target)
-                choice = HolderChoice({**made.keys, **at}, reason, pins)
+                choice = made.with_keys(at)._replace(reason=reason, pins=pins)
+                if made.is_round_an_end:
+                    choice = _told(choice, posed, mesh.triangles, along)
                 yield _OnFace(choice, axis, float(round(1e3 * seen.level)))
 
 
@@ -309,8 +421,7 @@ def _jaw(
     if made is None:
         return None
     box = box_beyond(mesh, k, of_file[k] > 0.0, 1e3 * cut * np.sign(of_file[k]))
-    keys = {**made.keys, "at": {"box_mm": box}, **({} if up else {"axis": axis.tolist()})}
-    return made._replace(keys=keys)
+    return made.with_keys({"at": {"box_mm": box}, **({} if up else {"axis": axis.tolist()})})
 
 
 def end_holder(
@@ -328,8 +439,9 @@ def end_holder(
     """
     if not target.any():
         return None
-    corners = (mesh.vertices @ rotation_matrix(turns).T)[mesh.triangles]
-    return _of_end(corners, end, target, BESIDE_END * ball, "up")
+    posed = mesh.vertices @ rotation_matrix(turns).T
+    made = _of_end(posed[mesh.triangles], end, target, BESIDE_END * ball, "up")
+    return None if made is None else _told(made, posed, mesh.triangles, np.array([0.0, 0.0, 1.0]))
 
 
 def _of_end(
@@ -372,16 +484,18 @@ def _around_end(seen: _Seen) -> HolderChoice | None:
     if grip < SHORTEST * needed.min() or grip <= 0.0:
         return None
     tip = 2.0 * aside[highest > level - TIP * grip].max(axis=0, initial=0.0)
-    outside = [math.ceil(2e3 * (one + 2.0 * WALL) - 1e-6) / 2.0 for one in needed]
-    size = {"diameter_mm": outside[0]} if is_round else {"size_mm": outside}
+    usual = min(max(OF_WIDTH * float(needed.min()), WALLS[0]), THICKEST)
+    sizes = []
+    for wall in dict.fromkeys((usual, *WALLS)):
+        outside = [math.ceil(2e3 * (one + 2.0 * wall) - 1e-6) / 2.0 for one in needed]
+        sizes.append({"diameter_mm": outside[0]} if is_round else {"size_mm": outside})
     beyond = plain(1e3 * (level - grip - target_top), 2)
     text = f"round the end that points {seen.where}, which is not peened; the target begins"
-    if (tip < STRAIGHT * needed).any():
-        beyond += f" mm beyond it; {POTTED}"
-    else:
-        beyond += " mm beyond it"
-    keys = {"kind": "collar" if is_round else "plate", **size, "grip_mm": round(1e3 * grip, 1)}
-    return HolderChoice(keys, f"{text} {beyond}")
+    kind, grip_mm = "collar" if is_round else "plate", round(1e3 * grip, 1)
+    first, *thinner = ({"kind": kind, **size, "grip_mm": grip_mm} for size in sizes)
+    narrows = bool((tip < STRAIGHT * needed).any())
+    reason = f"{text} {beyond} mm beyond it"
+    return HolderChoice(first, reason, thinner=tuple(thinner), narrows=narrows)
 
 
 def _block(seen: _Seen, area: float, long: float) -> HolderChoice | None:

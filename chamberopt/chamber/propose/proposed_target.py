@@ -24,7 +24,7 @@ from chamberopt.geometry.face_shapes import (
     teeth_of,
 )
 from chamberopt.geometry.meshes.part_mesh import PartMesh, select_triangles
-from chamberopt.geometry.triangles import areas, border_edges
+from chamberopt.geometry.triangles import areas, border_edges, centre_of_mass
 
 TOLD = 0.5  # share of a surface that others named tell of, from which on it is not named
 CREASE_DEG = 30.0
@@ -66,6 +66,7 @@ COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 
 BY_PROGRAM = re.compile(r"(?:created|exported|generated|written)[\s_-]+(?:by|from|with)\b", re.I)
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
 FACE = re.compile(r"face (\d+)", re.I)
+AROUND = 0.1  # share of the fillets' area from which on a face is one in which they lie
 SAME_RADIUS = 0.02  # relative difference of radii below which fillets are of one radius
 MOST_NAMED = 5  # surfaces of a target that are named; of more, the first are
 Keys = dict[str, Any]
@@ -93,6 +94,8 @@ class Target:
     keys: Keys
     triangles: np.ndarray  # (m,) bool
     reason: str
+    # Fillets that were chosen by their shape, of which it is made: some of them may be left out.
+    fillets: tuple[Surface, ...] = ()
 
 
 def surfaces(mesh: PartMesh) -> list[Surface]:
@@ -198,8 +201,9 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         others = [one for one in faces if one not in pattern]
         return _joined(pattern, f"{text}{beside(others)}; {BY_SHAPE}")
     if fillets:
-        text = f"by their shape, as such are usually peened{beside(faces)}; {BY_SHAPE}"
-        return _joined(fillets, text)
+        text = f"by their shape, as such are usually peened{beside(faces)}"
+        text += f"{_around(fillets, faces, area)}; {BY_SHAPE}"
+        return replace(_joined(fillets, text), fillets=tuple(fillets))
     sizes = [area[one.triangles].sum() for one in faces]
     large = [one for one, size in zip(faces, sizes, strict=True) if size >= AS_LARGE * sizes[0]]
     large = [
@@ -208,6 +212,50 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         if one is large[0] or not is_inside_of_tube(mesh.vertices, own[one.triangles])
     ]
     return _joined(large, by_size("the largest between sharp edges", faces[len(large) :]))
+
+
+def _around(fillets: Sequence[Surface], faces: Sequence[Surface], area: np.ndarray) -> str:
+    """Return words for the faces that go on smoothly from some fillets, if they are much larger.
+
+    Args:
+        faces: faces between sharp edges.
+        area: of the part's triangles [m²], (m,).
+    """
+    own = np.any([one.triangles for one in fillets], axis=0)
+    size = float(area[own].sum())
+    beside = [one for one in faces if area[own & one.triangles].sum() > AROUND * size]
+    if not beside or sum(area[one.triangles].sum() for one in beside) < 2.0 * size:
+        return ""
+    asked = " ".join(f'--target "{one.name}"' for one in beside[:MOST_NAMED])
+    return f"; with all of the surfaces that they lie in: {asked}"
+
+
+def fewer_fillets(mesh: PartMesh, target: Target) -> list[Target]:
+    """Return the targets that leave out fillets near the heavier end of a part, the fewest first.
+
+    So that end may be held. There are none of a target that is not fillets chosen by their shape.
+    """
+    axis = int(np.ptp(mesh.vertices, axis=0).argmax())
+    own, area = mesh.vertices[:, axis], areas(mesh.vertices, mesh.triangles)
+    heavy = float(centre_of_mass(mesh.vertices, mesh.triangles)[axis])
+    way = 1.0 if heavy > 0.5 * float(own.min() + own.max()) else -1.0
+    middle = way * own[mesh.triangles].mean(axis=1)
+    nearest = sorted(
+        target.fillets,
+        key=lambda one: -float(np.average(middle[one.triangles], weights=area[one.triangles])),
+    )
+    found = []
+    for number in range(1, len(nearest)):
+        without, left = nearest[:number], nearest[number:]
+        asked = " ".join(f'--target "{one.name}"' for one in without)
+        these = ", ".join(f"{one.name} ({one.text})" for one in without)
+        text = (
+            "by their shape, as such are usually peened, and so that an end is free to hold it by; "
+            f"FILLETS ARE NOT IN THE TARGET, {these}: give them a design of their own, by {asked}; "
+            f"{BY_SHAPE}"
+        )
+        found.append(_joined(left, text))
+    return found
 
 
 def crease_deg(mesh: PartMesh) -> float:

@@ -44,8 +44,10 @@ def test_a_study_takes_what_is_proposed(
 ) -> None:
     """Its values have a number of steps that it takes, the start among them, within the limits."""
     ball_mass = 7790.0 * np.pi / 6.0 * (1e-3 * ball_mm) ** 3
-    charge, why, _ = propose_charge(1e-6 * floor_mm2, 1e-3 * ball_mm, ball_mass)
+    charge, why, full = propose_charge(1e-6 * floor_mm2, 1e-3 * ball_mm, ball_mass)
     assert (charge, why[: len(reason)]) == (pytest.approx(mass_g), reason)
+    assert bool(full) == reason.startswith("less than")
+    assert full * ball_mass * 1e3 > 1.1 * charge or not full
     distance = max(8e-3, 0.3e-3 * height_mm)
     below = 1e-3 * height_mm - distance - 5e-3 * ball_mm
     sizes = Sizes("box", {}, distance, 1e-3 * height_mm, 0.01, False, below)

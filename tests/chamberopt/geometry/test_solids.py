@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import Manifold
 
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.solids import (
@@ -10,6 +11,7 @@ from chamberopt.geometry.solids import (
     Solid,
     find_cavities,
     make_solid,
+    passes_opening,
     snap_to_grid,
     subtract,
     unite,
@@ -91,3 +93,27 @@ def test_a_wall_cuts_a_room_in_two_and_an_island_stays_with_its_room() -> None:
     low, high, island = 0.04**2 * 0.024, 0.04**2 * 0.014, 0.004**3
     assert volumes == pytest.approx([low - island, high], rel=1e-9)
     assert np.sum(rooms) == len(surface.triangles)
+
+
+@pytest.mark.parametrize("larger", [1.0, 5.0])
+@pytest.mark.parametrize(
+    ("low", "high", "aside", "passes"),
+    [
+        (4.0, 10.0, 0.0, (True, False)),  # a pin under a head, which goes in from above
+        (10.0, 4.0, 0.0, (False, True)),  # a lid goes over a pin that stands on a foot
+        (10.0, 10.0, 0.0, (False, False)),
+        (5.0, 5.2, 0.0, (True, True)),  # by its clearance
+        (4.0, 4.0, 3.0, (False, False)),  # as wide, but not below each other
+    ],
+)
+def test_what_is_beside_an_opening_does_not_pass_it(
+    low: float, high: float, aside: float, passes: tuple[bool, bool], larger: float
+) -> None:
+    """A round of 5 mm radius in the opening, and other ones below and above it [mm]."""
+    body = Manifold.cylinder(10, 5, circular_segments=64)
+    body += Manifold.cylinder(10, low, circular_segments=64).translate([aside, 0, -9])
+    body += Manifold.cylinder(10, high, circular_segments=64).translate([-aside, 0, 9])
+    mesh = body.to_mesh()
+    vertices = 1e-3 * larger * mesh.vert_properties.astype(float)
+    found = passes_opening(vertices, mesh.tri_verts, 5e-3 * larger, 0.3e-3 * larger)
+    assert found == passes

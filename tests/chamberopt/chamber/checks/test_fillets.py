@@ -8,7 +8,13 @@ import trimesh
 from scipy.spatial import Delaunay
 
 from chamberopt.chamber.checks.check import shot_reach
-from chamberopt.chamber.checks.fillets import facet_warnings, fillet_warnings, inner_edges
+from chamberopt.chamber.checks.fillets import (
+    InnerEdges,
+    facet_warnings,
+    fillet_warnings,
+    inner_edges,
+    too_narrow,
+)
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from tests.helpers.synthetic import chamber_round
 
@@ -81,3 +87,27 @@ def test_facets_are_warned_of_where_they_tell_of_the_coverage(
     part = SimpleNamespace(smoothing=facts, hollow=None)
     warned = facet_warnings(part, 1e-3, reachable)  # type: ignore[arg-type]
     assert [told is not None and told in one.text for one in warned] == [True] * (told is not None)
+
+
+@pytest.mark.parametrize("larger", [1.0, 4.0])
+@pytest.mark.parametrize(
+    ("curl_mm2", "others", "counts"),
+    [
+        (0.34, 2.0, False),  # at the trailing edge of a vane, of 217 mm²
+        (10.0, 2.0, True),
+        (0.34, 100.0, True),  # beside a wide hollow alone it is a fillet of its own
+        (0.34, 0.0, True),  # beside no other fillet too
+    ],
+)
+def test_a_curl_at_the_end_of_a_fillet_does_not_count(
+    curl_mm2: float, others: float, counts: bool, larger: float
+) -> None:
+    """An edge with a radius of 0.5 mm beside others of some mm, for balls of 0.8 mm."""
+    radius = 1e-3 * larger * np.array([0.5, others])
+    area = 1e-6 * larger**2 * np.array([0.5 * curl_mm2, 0.5 * curl_mm2, 109.0, 108.0])
+    edges = InnerEdges(np.zeros((2, 3)), np.ones(2), radius, np.arange(4).reshape(2, 2))
+    small = too_narrow(edges, area, 0.8e-3 * larger)
+    assert small.tolist() == [counts, others == 0.0]
+    # An inner edge without a fillet always counts.
+    bare = edges._replace(radius=np.zeros(2))
+    assert too_narrow(bare, area, 0.8e-3 * larger).all()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.propose.pose import propose_pose
+from chamberopt.chamber.propose.pose import pose_in_words, propose_pose
+from tests.chamberopt.chamber.propose.test_proposed_arbor import drum, part_of
 
 
 @pytest.mark.parametrize(
@@ -24,3 +25,11 @@ def test_only_what_stands_upright_has_all_its_sides_exposed_alike(
     target = is_target(body.face_normals)
     _, reason = propose_pose(1e-3 * np.asarray(body.vertices), np.asarray(body.faces), target)
     assert ("exposed alike" in reason) is alike
+
+
+@pytest.mark.parametrize("turn", [85.0, -85.0, 30.0])
+def test_a_turn_about_the_vertical_is_told_with_its_way(turn: float) -> None:
+    mesh, _ = part_of(drum(10.0, 20.0))
+    words = pose_in_words(mesh, [], (0.0, 0.0, turn))
+    assert f"turned by {abs(turn):g} degrees about the vertical" in words
+    assert words.endswith(", clockwise as seen from above") == (turn < 0.0)

@@ -4,12 +4,15 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import warnings
 from chamberopt.chamber.checks.place_names import PART, PART_SIDE
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
+from chamberopt.chamber.propose import held_proposal
+from chamberopt.chamber.propose.held_proposal import _where_left
 from chamberopt.chamber.propose.proposal import (
     COUNTED,
     holding,
@@ -17,6 +20,7 @@ from chamberopt.chamber.propose.proposal import (
     propose_tolerances,
     warned_again,
 )
+from chamberopt.chamber.propose.proposed_target import Surface
 from tests.helpers.synthetic import plate_design
 
 
@@ -80,3 +84,27 @@ def test_a_changed_proposal_still_warns_of_a_floor_wider_than_any_sonotrode() ->
     chamber = build_chamber(design)
     warned = warned_again(found(wide, full), design, chamber)
     assert warned == (wide, *warnings(design, chamber))
+
+
+@pytest.mark.parametrize("radius", [0.4e-3, 2e-3])
+@pytest.mark.parametrize(
+    ("hidden", "told"),
+    [
+        ([0, 1], "mostly on ROOT in hollows of about {} mm, "),
+        ([2, 3], "mostly on FLANK, "),
+        ([1, 2, 3, 4], ""),
+    ],
+)
+def test_what_is_left_out_is_named(
+    monkeypatch: pytest.MonkeyPatch, radius: float, hidden: list[int], told: str
+) -> None:
+    """Of six triangles in the target two are a hollow root, two a flank, and two a tip."""
+    names = {"ALL": range(6), "ROOT": [0, 1], "FLANK": [2, 3], "TIP": [4, 5]}
+    rows = {name: np.isin(np.arange(6), one) for name, one in names.items()}
+    monkeypatch.setattr(held_proposal, "rows_of", lambda _, keys: rows[keys["surface"][0]])
+    hollow = np.where(rows["ROOT"], 1.0 / radius, 0.0)
+    part = SimpleNamespace(area=np.ones(6), target=np.ones(6, dtype=bool), hollow=hollow)
+    known = [Surface(name, {"surface": [name]}, one, "") for name, one in rows.items()]
+    made = SimpleNamespace(design=None, chamber=SimpleNamespace(part=part), known=known)
+    left = np.isin(np.arange(6), hidden) * 1.0
+    assert _where_left(made, left) == told.format(f"{1e3 * radius:.2g}")  # type: ignore[arg-type]

@@ -9,9 +9,10 @@ from shapely import Polygon
 
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.proposal import Wanted
-from chamberopt.chamber.propose.proposed_balls import SizeFit, fit_sizes, propose_ball
+from chamberopt.chamber.propose.proposal import Wanted, sonotrode_area
+from chamberopt.chamber.propose.proposed_balls import SizeFit, charge_of, fit_sizes, propose_ball
 from chamberopt.chamber.propose.proposed_intensity import with_thin_places
+from chamberopt.chamber.propose.text import clauses, to_settle
 from chamberopt.geometry.triangles import areas
 
 
@@ -145,3 +146,50 @@ def test_balls_are_small_beside_thin_metal(thick_mm: float, most_mm: float, tmp_
     assert 0.6 * most_mm < 1e3 * made.design.shot.diameter <= most_mm
     is_told = "THIN PLACES" in with_thin_places(made).reasons["shot.diameter_mm"]
     assert is_told is (thick_mm < 2.0)
+
+
+@pytest.mark.parametrize(
+    ("width_mm", "nearly"), [(0.62, True), (0.66, True), (0.70, False), (0.42, True), (0.36, False)]
+)
+def test_a_gap_may_be_off_by_its_tolerance(width_mm: float, nearly: bool) -> None:
+    """Balls of 0.5 mm jam from 0.45 to 0.575 mm: a slot is 15 % off, and 0.1 mm at most."""
+    block = block_with_slot(width_mm)
+    (fit,) = fit_sizes(part_of(block, np.ones(len(block.faces), dtype=bool)), [0.5e-3])
+    assert fit.jam == 0.0
+    assert bool(fit.nearly_jam) is nearly
+    if nearly:
+        assert 1e3 * fit.play == pytest.approx(width_mm - 0.5, abs=0.02)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+@pytest.mark.parametrize(
+    ("served", "chosen", "said"),
+    [(0.80, 1.5, "0.5 mm may jam in a gap of"), (0.60, 0.5, "which serve 60%")],
+)
+def test_a_size_that_may_jam_gives_way_to_one_that_serves_nearly_as_much(
+    served: float, chosen: float, said: str, scale: float
+) -> None:
+    may_jam = SizeFit(0.5e-3 * scale, 1.0, 0.9, False, 0.0, 900, nearly_jam=0.6e-3 * scale)
+    sizes = [SizeFit(k * 1e-3, 1.0, 0.9, False, k * 1e-3, 100) for k in np.linspace(1.05, 1.4, 6)]
+    free = SizeFit(1.5e-3 * scale, served, served, False, 0.0, 100)
+    diameter, reason = propose_ball([may_jam, *sizes, free])
+    assert 1e3 * diameter == pytest.approx(chosen * scale)
+    assert said.replace("0.5 mm", f"{0.5 * scale:g} mm") in reason
+    assert "all sizes from 1.05 mm to 1.4 mm would jam" in reason
+    play = [one for one in clauses(reason)[1] if one.startswith("PLAY OF")]
+    assert len(play) == (chosen == 0.5)
+
+
+@pytest.mark.parametrize(("ball_mm", "is_cut"), [(0.2, True), (1.0, False)])
+def test_a_charge_that_is_cut_for_the_simulation_is_told_in_full(
+    ball_mm: float, is_cut: bool, tmp_path: Path
+) -> None:
+    trimesh.creation.box((50, 40, 10)).export(tmp_path / "block.stl")
+    made = propose(tmp_path / "block.stl", Wanted("mm", ball_mm=ball_mm), lambda _: [])
+    assert sonotrode_area(made.chamber) > 1e-3
+    told = [one for one in to_settle(made, []) if one.startswith("CHARGE IS CUT")]
+    assert len(told) == made.is_capped == is_cut
+    if is_cut:
+        full = charge_of(sonotrode_area(made.chamber), 1e-3 * ball_mm)
+        assert f"half a layer is {round(full):,} balls" in told[0]
+        assert made.design.shot.count < 0.7 * full

@@ -8,10 +8,17 @@ import pytest
 import trimesh
 from manifold3d import CrossSection, Manifold, OpType
 
+from chamberopt.chamber.propose import first_design
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.proposal import Wanted
+from chamberopt.chamber.propose.held_proposal import is_firm, is_held_thinly
+from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_end import bare_end, held_end
-from chamberopt.chamber.propose.proposed_holder import HolderChoice, end_holder, holder_choices
+from chamberopt.chamber.propose.proposed_holder import (
+    HolderChoice,
+    end_holder,
+    holder_choices,
+    thin_grip,
+)
 from chamberopt.chamber.propose.proposed_mask import find_left_out
 from chamberopt.chamber.propose.proposed_target import WHOLE, Surface, Target, apart
 from chamberopt.chamber.propose.text import clauses, design_text
@@ -87,7 +94,7 @@ def test_a_shaft_gets_a_collar_up_to_where_it_widens() -> None:
     below = body.triangles_center[:, 2] < 1e-6
     first, second = choices_of(body, below)[:2]
     assert (first.keys["kind"], first.keys["grip_mm"]) == ("collar", 12.0)
-    assert first.keys["diameter_mm"] == pytest.approx(12 + 2 * 2)  # walls of 2 mm
+    assert first.keys["diameter_mm"] == pytest.approx(12 + 2 * 5)  # walls of 5 mm
     assert second.keys["kind"] == "rod"
     # With the flank of the disc's top as the target, the collar ends two balls above it.
     short = solid(
@@ -107,7 +114,7 @@ def test_a_root_is_held_by_a_block_round_its_widest_place() -> None:
     body = solid(blade)
     first = choices_of(body, body.triangles_center[:, 2] < 40.0)[0]
     assert first.keys["kind"] == "plate"
-    assert first.keys["size_mm"] == [44.0, 20.0]
+    assert first.keys["size_mm"] == [50.0, 26.0]
     assert first.keys["grip_mm"] == pytest.approx(60 - 40 - 2, abs=0.11)
     assert "the target begins 2 mm beyond it" in first.reason
 
@@ -162,7 +169,7 @@ def test_a_jaw_holds_an_end_of_any_form_beside_the_target() -> None:
         (jaw,) = (one for one in choices_of(body, target) if one.is_round_an_end)
         assert (jaw.keys["kind"], jaw.keys["axis"]) == ("plate", [1.0, 0.0, 0.0])
         assert jaw.keys["grip_mm"] == pytest.approx(min(28, 70 - edge - 2), abs=0.11)
-        assert jaw.keys["size_mm"] == [24.0, 14.0]
+        assert jaw.keys["size_mm"] == [30.0, 20.0]
         (low, _), (high, _) = (one[:2] for one in jaw.keys["at"]["box_mm"])
         assert low == pytest.approx(70 - jaw.keys["grip_mm"], abs=0.11)
         assert high > 70.0
@@ -228,7 +235,7 @@ def test_a_part_that_is_all_target_is_held_by_its_slimmer_end() -> None:
     assert end.target.keys["box_mm"][0][2] == end.at["box_mm"][1][2] == 10.5
     holder = end_holder(mesh, end.target.triangles, end.turns, BALL, end.triangles)
     assert holder is not None
-    assert (holder.keys["kind"], holder.keys["diameter_mm"]) == ("collar", 14.0)
+    assert (holder.keys["kind"], holder.keys["diameter_mm"]) == ("collar", 20.0)
     assert 8.5 < holder.keys["grip_mm"] <= 10.5 - 1e3 * BALL
     assert held_end(mesh, end.target, (0.0, 0.0, 0.0)) is None  # not all of it is target
     assert held_end(mesh, whole, (30.0, 0.0, 0.0)) is None  # no axis of the file is upright
@@ -316,3 +323,97 @@ def test_a_body_is_not_named_beside_its_faces() -> None:
     told = [(surface(name), float(one.sum()), one) for name, one in each.items()]
     assert [(one.name, size) for one, size in apart(told)] == [("FRONT", 4.0), ("REAR", 3.0)]
     assert apart([]) == []
+
+
+def blade_on_root(thick: float, long: float) -> trimesh.Trimesh:
+    """A blade, 30 mm wide, that stands along z on a block of 40 x 30 x 20 mm [mm]."""
+    root = Manifold.cube((40, 30, 20)).translate([-20, -15, -20])
+    return solid(root + Manifold.cube((30, thick, long)).translate([-15, -0.5 * thick, 0]))
+
+
+@pytest.mark.parametrize("larger", [1.0, 3.0])
+@pytest.mark.parametrize(
+    ("thick", "long", "axis", "is_thin"),
+    [
+        (2.0, 60.0, (0, 0, 1), True),
+        (3.0, 60.0, (0, 0, 1), True),
+        (12.0, 60.0, (0, 0, 1), False),  # of thick metal
+        (2.0, 20.0, (0, 0, 1), False),  # the centre of mass is near
+        (2.0, 60.0, (0, 0, -1), False),  # held by its root
+    ],
+)
+def test_a_blade_is_not_held_by_its_tip(
+    thick: float, long: float, axis: tuple[int, int, int], is_thin: bool, larger: float
+) -> None:
+    body = blade_on_root(thick, long)
+    grip = larger * 8e-3
+    found = thin_grip(1e-3 * larger * body.vertices, body.faces, np.array(axis, float), grip)
+    assert (found is not None) == is_thin
+    if found is not None:
+        middle = body.center_mass[2]
+        assert found.metal == pytest.approx(1e-3 * larger * thick, rel=0.1)
+        assert found.overhang == pytest.approx(1e-3 * larger * (long - 8.0 - middle), rel=1e-3)
+        assert "THIN GRIP" in clauses(found.text)[1][0]
+
+
+@pytest.mark.parametrize(("thick", "long"), [(2.0, 60.0), (3.0, 70.0)])
+def test_the_thin_end_of_a_blade_gives_way_to_its_root(
+    thick: float, long: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its foot is peened. As it lies what holds it is taken for thin, and it stands instead."""
+    body = blade_on_root(thick, long).subdivide_to_size(8.0)
+    z = body.triangles_center[:, 2]
+    foot = (z > -3.0) & (z < 8.0)
+    lines = [f"v {x} {y} {z}" for x, y, z in body.vertices]
+    for name, rows in (("FILLET", foot), ("OTHERS", ~foot)):
+        lines += [f"g {name}", *(f"f {a} {b} {c}" for a, b, c in body.faces[rows] + 1)]
+    part = tmp_path / "blade.obj"
+    part.write_text("\n".join(lines) + "\n")
+    monkeypatch.setattr(first_design, "propose_pose", lambda *_: ((0.0, 90.0, 0.0), "lying"))
+    found: list[bool] = []
+
+    def is_thin_at_first(made: Proposal) -> bool:
+        found.append(is_held_thinly(made) if found else True)
+        return found[-1]
+
+    monkeypatch.setattr(first_design, "is_held_thinly", is_thin_at_first)
+    made = propose(part, Wanted("mm"), lambda _: [])
+    assert found == [True, False]
+    assert made.design.part.rotate_deg[:2] == (180.0, 0.0)  # its root up
+    assert is_firm(made)
+    assert not is_held_thinly(made)
+
+
+@pytest.mark.parametrize(
+    ("wide", "walls"), [(12.0, [5.0, 2.0]), (32.0, [8.0, 5.0, 2.0]), (60.0, [10.0, 5.0, 2.0])]
+)
+def test_the_walls_round_an_end_are_thick_where_there_is_room(
+    wide: float, walls: list[float]
+) -> None:
+    """Those of a collar on a shaft that stands on a disc; thinner ones are tried where it jams."""
+    shaft = Manifold.cylinder(wide, 0.5 * wide, circular_segments=64)
+    body = solid(shaft.translate([0, 0, 10]) + Manifold.cylinder(10, 2 * wide))
+    first = choices_of(body, body.triangles_center[:, 2] < 1e-6)[0]
+    widths = [one["diameter_mm"] for one in (first.keys, *first.thinner)]
+    assert [0.5 * (one - wide) for one in widths] == pytest.approx(walls, abs=0.3)
+    assert all(one["at"] == first.keys["at"] for one in first.thinner)
+
+
+@pytest.mark.parametrize("larger", [1.0, 2.0])
+@pytest.mark.parametrize(("is_turned", "has_jaws"), [(False, True), (True, False)])
+def test_flat_sides_of_an_end_that_narrows_are_for_jaws(
+    is_turned: bool, has_jaws: bool, larger: float
+) -> None:
+    """A wedge, 20 mm thick, narrows to a third of its width; as a cone it has no flat sides."""
+    if is_turned:
+        end = Manifold.cylinder(30, 18, 6, circular_segments=64)
+    else:
+        end = Manifold.extrude(CrossSection([[(-18, 0), (18, 0), (6, 30), (-6, 30)]]), 20.0)
+        end = end.rotate([90, 0, 0]).translate([0, 10, 0])
+    made = end + Manifold.cube((80, 60, 20)).translate([-40, -30, -20])
+    body = solid(made.refine_to_length(4.0).scale([larger] * 3))
+    first = choices_of(body, body.triangles_center[:, 2] < -1e-6)[0]
+    assert first.is_round_an_end
+    assert first.narrows
+    assert ("jaws on its flat faces that look to" in first.reason) == has_jaws
+    assert ("NO STRAIGHT END TO CLAMP" in first.reason) != has_jaws

@@ -9,7 +9,11 @@ from chamberopt.chamber.propose.proposed_target import (
     BY_SHAPE,
     BY_SIZE,
     CREASE_DEG,
+    Surface,
+    Target,
+    _around,
     crease_deg,
+    fewer_fillets,
     propose_target,
     surfaces,
 )
@@ -138,3 +142,42 @@ def test_a_long_side_is_cut_where_it_meets_the_ceiling() -> None:
     sizes = sized(wedge, 20.0, 1.0)
     wide = 40.0 + 80.0 * 1e3 * (sizes.height - sizes.distance) / 200.0
     assert sizes.plan["length_mm"] == pytest.approx(wide + 2e3 * sizes.gap, abs=1.0)
+
+
+@pytest.mark.parametrize("root_up", [False, True])
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_fillets_near_the_heavier_end_are_left_out_first(count: int, root_up: bool) -> None:
+    """A bar on a block of the same length: bands round it stand for fillets of several radii."""
+    body = Manifold.cube((40, 40, 30)).translate([-20, -20, -30])
+    body += Manifold.cube((10, 10, 60)).translate([-5, -5, 0])
+    drawn_as = body.rotate([180, 0, 0]) if root_up else body
+    mesh, drawn = part_of(drawn_as.refine_to_length(4.0))
+    places = drawn.triangles_center[:, 2] * (-1.0 if root_up else 1.0)
+    fillets = [
+        Surface(
+            f"fillets of {k} mm", {"faces": [{"k": k}]}, abs(places - 20.0 * k) < 6.0, f"no {k}"
+        )
+        for k in range(count)
+    ]
+    marked = np.any([one.triangles for one in fillets], axis=0)
+    found = fewer_fillets(mesh, Target({}, marked, "", tuple(fillets[::-1])))
+    assert len(found) == count - 1
+    for out, one in enumerate(found, start=1):
+        assert (one.triangles == np.any([x.triangles for x in fillets[out:]], axis=0)).all()
+        assert all(f'--target "{x.name}"' in one.reason for x in fillets[:out])
+        assert not any(f'--target "{x.name}"' in one.reason for x in fillets[out:])
+
+
+@pytest.mark.parametrize(("wide", "is_told"), [(5.0, True), (0.3, False)])
+def test_the_surfaces_in_which_fillets_lie_are_named(wide: float, is_told: bool) -> None:
+    """A fillet of 1 mm² lies in two faces, each so many times as large."""
+    area = np.array([0.5, 0.5, wide, wide, 30.0])
+
+    def surface(name: str, *rows: int) -> Surface:
+        return Surface(name, {}, np.isin(np.arange(5), rows), "")
+
+    faces = [surface("face 1", 4), surface("face 2", 0, 2), surface("face 3", 1, 3)]
+    words = _around([surface("fillets", 0, 1)], faces, area)
+    assert words.endswith('--target "face 2" --target "face 3"') == is_told
+    assert "face 1" not in words
+    assert is_told or not words
