@@ -298,7 +298,11 @@ class _Pilots:
     def _chosen_way(self, first: Proposal) -> tuple[Compared, Wanted]:
         """Return the pose, sonotrodes and charge that peen quickest, and the wishes for them."""
         self.begin(TIME)
-        way = Way(first, self.wishes.geometry, self._measure(first, is_brief=True))
+        wanted = self.wishes.geometry
+        pose, fewer = first.thick_pose, first.without_fillets
+        if pose or fewer:  # all proposals hold the part alike
+            wanted = replace(wanted, may_leave_end=False, thick_pose=pose, without_fillets=fewer)
+        way = Way(first, wanted, self._measure(first, is_brief=True))
         self.begin(WAYS)
         made, wanted, found = propose_quicker(way, self._again, self._briefly)
         now = Compared(*propose_second_pose(made, found, self._briefly))

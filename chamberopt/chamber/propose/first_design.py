@@ -150,6 +150,8 @@ def propose(
         known = surfaces(mesh)
     asked = choose(known)
     target = propose_target(mesh, known, asked)
+    if wanted.without_fillets:
+        target = fewer_fillets(mesh, target)[wanted.without_fillets - 1]
     _require_near_origin(path, target)
     shape = Shape(mesh.vertices, mesh.triangles, target.triangles)
     if wanted.pose is None:
@@ -160,6 +162,9 @@ def propose(
     keeps_target = bool(asked) or not wanted.may_leave_end
     if wanted.pose in AT_SIDE:
         return _lying(path, wanted, mesh, known, target, turns, pose_reason, keeps_target)
+    if wanted.pose is None and wanted.thick_pose is not None:
+        turns = pose_by_size(*shape, wanted.thick_pose)
+        return _proposed(path, wanted, mesh, known, target, turns, NOT_THIN, None)
     end = None if keeps_target else held_end(mesh, target, turns)
     made = _proposed(path, wanted, mesh, known, target, turns, pose_reason, end)
     if wanted.pose is None and is_held_thinly(made):
@@ -192,20 +197,21 @@ def _held_otherwise(
             returned where nothing else holds the part better.
     """
 
-    def in_pose(pose: Pose) -> tuple[Target, Turns, str]:
-        turns = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, pose)
-        return target, turns, NOT_THIN
-
-    fewer = [
-        (one, *propose_pose(mesh.vertices, mesh.triangles, one.triangles))
-        for one in fewer_fillets(mesh, target)
-    ]
+    fewer = fewer_fillets(mesh, target)
+    ways: list[tuple[Pose | None, int]] = [("standing", 0)]
+    ways += [(None, number) for number in range(1, len(fewer) + 1)]
     second: Proposal | None = None  # on which balls would come to rest
-    for one, turns, why in (in_pose("standing"), *fewer, *map(in_pose, AT_SIDE)):
-        if one is target and turns[:2] == made.design.part.rotate_deg[:2]:
-            continue
+    for pose, number in (*ways, *((one, 0) for one in AT_SIDE)):
+        of = fewer[number - 1] if number else target
+        shape = mesh.vertices, mesh.triangles, of.triangles
+        turns, why = propose_pose(*shape)
+        if pose is not None:
+            turns, why = pose_by_size(*shape, pose), NOT_THIN
+            if turns[:2] == made.design.part.rotate_deg[:2]:
+                continue
         with suppress(InputError):
-            other = _proposed(path, wanted, mesh, known, one, turns, why, None)
+            other = _proposed(path, wanted, mesh, known, of, turns, why, None)
+            other = replace(other, without_fillets=number, thick_pose=pose)
             is_held = is_firm(other) and not grips_poorly(other) and not is_held_thinly(other)
             if not is_held or len(other.jams) > len(made.jams):
                 continue

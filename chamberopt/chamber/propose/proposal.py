@@ -74,6 +74,10 @@ class Wanted:
     turned_over: bool = False  # after half of the time, as a second step
     may_turn: bool = True  # about the axis of a bore, where that brings no new fault
     may_leave_end: bool = True  # out of the target, to hold the part by it
+    # How a part that an end of thin metal would hold is held otherwise, where that was found: with
+    # so many fillets fewer as its target, or in a pose.
+    without_fillets: int = 0
+    thick_pose: Pose | None = None
 
 
 @dataclass(frozen=True)
@@ -120,6 +124,8 @@ class Proposal:
     strips: Strips | None = None  # of which the target is one
     # True if its chamber holds fewer balls than it should, as more take too long.
     is_capped: bool = False
+    without_fillets: int = 0  # those of Wanted, to propose the same again
+    thick_pose: Pose | None = None
     leaves_end: bool = False  # true if the part is held by an end that its target leaves out
     closed: tuple[str, ...] = ()  # sides at which a face of the part is the wall, such as "-x"
     # Of all replicas of a candidate [s], to know the time in which its target is covered; None if

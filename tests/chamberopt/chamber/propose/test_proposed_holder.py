@@ -382,6 +382,12 @@ def test_the_thin_end_of_a_blade_gives_way_to_its_root(
     assert made.design.part.rotate_deg[:2] == (180.0, 0.0)  # its root up
     assert is_firm(made)
     assert not is_held_thinly(made)
+    # The way that was found is taken at once for balls of other sizes.
+    assert made.thick_pose is not None
+    found_so = Wanted("mm", may_leave_end=False, thick_pose=made.thick_pose)
+    again = propose(part, found_so, lambda _: [])
+    assert len(found) == 2
+    assert again.design == made.design
 
 
 @pytest.mark.parametrize(
