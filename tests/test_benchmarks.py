@@ -54,6 +54,7 @@ def test_all_structures_find_the_same_meetings() -> None:
     who_meets_whom.require_agreement(answers)
 
 
+@pytest.mark.long
 def test_the_analytical_chamber_beside_the_meshed_one(tmp_path: Path) -> None:
     """A rough run still gives the whole page.
 

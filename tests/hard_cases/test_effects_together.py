@@ -67,6 +67,7 @@ def shot(positions: object, velocities: object = 0.0, spins: object = 0.0) -> Ba
     return Balls(places, speeds, 2 * R, spins=turns)
 
 
+@pytest.mark.long
 def test_a_ball_dropped_on_a_turntable_goes_round_with_two_sevenths_of_its_speed() -> None:
     """A ball that rolls on a turntable goes round with 2/7 of its angular speed (J. A. Burns, Am.
     J. Phys. 49 (1981) 56). In hops that last s, each of which ends in sticking: at hit k it is at r

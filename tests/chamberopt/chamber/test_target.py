@@ -186,6 +186,7 @@ def test_what_the_shot_cannot_touch_can_be_left_out_of_the_target() -> None:
     assert not any("set part.target.reachable" in one.text for one in facts["warnings"])
 
 
+@pytest.mark.long
 def test_a_target_can_be_given_to_a_chamber() -> None:
     """As a study does, which keeps that of its start."""
     design = with_reachable(True, shot__diameter_mm=3.0)

@@ -125,7 +125,7 @@ def test_mean_and_deviation_have_no_bias_and_their_intervals_hold(
 
 
 @pytest.mark.parametrize("dents", [25.0, pytest.param(60.0, marks=pytest.mark.long)])
-@pytest.mark.parametrize("field", ["even", "ramp"])
+@pytest.mark.parametrize("field", [pytest.param("even", marks=pytest.mark.long), "ramp"])
 def test_percentile_and_time_are_right_from_25_dents_on(field: str, dents: float) -> None:
     groups = list(groups_of(field, dents, 100))
     low, x = true_figures(FIELDS[field])["p05_coverage"], FIELDS[field]
@@ -156,6 +156,7 @@ def test_few_replicas_give_the_same_percentile(replicas: int) -> None:
     assert np.mean(values) == pytest.approx(wanted, abs=0.015)
 
 
+@pytest.mark.long
 def test_the_figures_do_not_depend_on_how_long_was_simulated() -> None:
     """Without the products, few dents would make the surface uneven and less covered."""
     plain, found = {}, {}

@@ -37,6 +37,7 @@ def of_valley(out_of_reach: float, points: int) -> tuple[Reach, dict[str, Estima
     return field.reach, found, list(reach_notes(field.reach))
 
 
+@pytest.mark.long
 def test_at_the_limit_the_choice_of_points_does_not_throw_the_fifth_percentile() -> None:
     found = [of_valley(0.05, points) for points in POINTS]
     above, below = (of_valley(share, 20_000)[1]["p05_coverage"] for share in (0.04, 0.07))

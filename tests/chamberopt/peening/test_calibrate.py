@@ -210,6 +210,7 @@ def test_without_strips_there_is_no_intensity_and_it_is_said(tmp_path: Path) -> 
     assert "no intensity in mmA" in "\n".join(calibration_lines(found, predict(found)))
 
 
+@pytest.mark.long
 def test_what_the_model_cannot_explain_is_said_and_widens_intervals(
     found: Calibrated, tmp_path: Path
 ) -> None:

@@ -57,6 +57,7 @@ def test_a_window_shows_what_its_keys_say(steps: dict[str, dict[str, Any]]) -> N
 
 
 @needs_opengl
+@pytest.mark.long
 def test_handles_are_there_when_they_do_something(steps: dict[str, dict[str, Any]]) -> None:
     slider = {step: steps[step]["slider"] for step in ("opened", "3", "1", "r")}
     assert slider == {"opened": True, "3": False, "1": True, "r": True}

@@ -150,6 +150,7 @@ def test_pointing_at_the_target_shows_its_numbers_and_the_triangles(shown: OpenP
         assert name in kept
 
 
+@pytest.mark.long
 def test_a_saturated_target_begins_with_what_tells_places_apart(
     browser: Any, tmp_path: Path
 ) -> None:

@@ -75,7 +75,10 @@ def test_every_algorithm_goes_on_from_any_row(algorithm: str, batch: int, tmp_pa
 
 @pytest.mark.usefixtures("quick_disk")
 @pytest.mark.parametrize("batch", [pytest.param(1, marks=pytest.mark.long), 3])
-@pytest.mark.parametrize("objective", [{}, {"pareto": ["uniform_coverage", "p05_coverage"]}])
+@pytest.mark.parametrize(
+    "objective",
+    [{}, pytest.param({"pareto": ["uniform_coverage", "p05_coverage"]}, marks=pytest.mark.long)],
+)
 def test_what_is_learnt_from_few_replicas_is_learnt_again(
     objective: dict, batch: int, tmp_path: Path
 ) -> None:

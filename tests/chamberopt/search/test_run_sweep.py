@@ -174,6 +174,7 @@ def test_what_a_sweep_leaves(vary: dict, way: tuple, tmp_path: Path) -> None:
         load_result(tmp_path)
 
 
+@pytest.mark.long
 def test_the_same_rows_whatever_works_on_them(tmp_path: Path) -> None:
     question = small_study()
     plan = plan_sweep(question, None, 6)

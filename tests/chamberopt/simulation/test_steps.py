@@ -108,6 +108,7 @@ def test_uncovered_shares_of_steps_in_one_pose_multiply() -> None:
         assert not found["steps.fine.strength_um"].in_words
 
 
+@pytest.mark.long
 def test_two_equal_steps_are_one_step_of_twice_the_time() -> None:
     """The same impacts, in two steps and in one, give the same figures of the target."""
     design = plate({"name": "again"}, **{"part.target": LOWER["target"]})

@@ -145,6 +145,7 @@ def bare() -> dict[str, list[str]]:
     return found
 
 
+@pytest.mark.long
 def test_the_machine_code_of_a_bare_scene_knows_no_effect(bare: dict[str, list[str]]) -> None:
     assert "sim_core.loop.events.advance" in bare
     wrong = {

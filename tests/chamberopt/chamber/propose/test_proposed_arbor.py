@@ -147,6 +147,7 @@ def test_flanges_are_cups_that_close_on_a_web_beside_its_hub(hub: float) -> None
     assert arbor_through(bore, leaning, rim, (90, 0, 0), BALL, with_cups=True) is None
 
 
+@pytest.mark.long
 def test_cups_leave_nothing_of_a_hub_to_the_shot(tmp_path: Path) -> None:
     disc = ring(40, 10, 12) + ring(18, 10, 24).translate([0, 0, -6])
     _, body = part_of(disc)

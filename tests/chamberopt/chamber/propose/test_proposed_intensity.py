@@ -174,7 +174,10 @@ def test_machines_of_other_laws_are_found_by_pilots(
     assert made.design.process.intensity_mmA == (intensity.low, intensity.high)
 
 
-@pytest.mark.parametrize(("given", "ball_mm"), [("0.10-0.15A", 1.5), ("0.03-0.05A", 1.0)])
+@pytest.mark.parametrize(
+    ("given", "ball_mm"),
+    [("0.10-0.15A", 1.5), pytest.param("0.03-0.05A", 1.0, marks=pytest.mark.long)],
+)
 def test_larger_balls_that_serve_most_are_taken_only_for_the_intensity(
     plate: Path, shop: Shop, given: str, ball_mm: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -376,7 +379,7 @@ def test_a_weak_intensity_stands_on_n_strips_too(plate: Path, shop: Shop) -> Non
     assert "0.06 mmA, within a factor of 2.5 (0.18 mm on N strips)" in told.reasons[INTENSITY]
 
 
-@pytest.mark.parametrize("metal", ["IN718", "Ti-6Al-4V"])
+@pytest.mark.parametrize("metal", [pytest.param("IN718", marks=pytest.mark.long), "Ti-6Al-4V"])
 def test_thin_places_are_told_of_every_metal(tmp_path: Path, shop: Shop, metal: str) -> None:
     for thick, is_thin in ((1.5, True), (3.0, False)):
         path = tmp_path / f"{thick}.stl"

@@ -102,6 +102,7 @@ def test_a_long_bar_is_held_in_each_pose(poses: dict[Pose | None, Proposal]) -> 
         assert part.min() > -half
 
 
+@pytest.mark.long
 def test_a_quick_design_is_not_tried_in_other_ways(poses: dict[Pose | None, Proposal]) -> None:
     def again(_: Wanted) -> Proposal:
         raise AssertionError

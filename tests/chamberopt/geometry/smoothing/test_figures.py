@@ -9,6 +9,7 @@ CASES = dict(cases())
 SHORT = {"process.accuracy.simulated_time_s": 2.0}
 
 
+@pytest.mark.long
 def test_block_of_coarse_facets() -> None:
     """Facets of 30 degrees; 1.5 half-widths are three standard errors."""
     case = CASES["block, R = 1.5 r"]
