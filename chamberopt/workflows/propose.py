@@ -224,14 +224,15 @@ def _settings_beside(made: Proposal, folder: Path, left_out: Sequence[LeftOut]) 
     """
     texts: dict[str, str] = {}
     strips = made.strips
-    for number in range(strips.settings) if strips else ():
-        if strips and number != strips.chosen:
-            with suppress(InputError):
-                other = in_setting(made, strips, number)
-                build_chamber(other.design)
-                head = f"# Setting {number + 1} of {strips.settings}, beside {DESIGN}, which is "
-                head += f"setting {strips.chosen + 1}.\n"
-                texts[f"setting_{number + 1}.toml"] = head + design_text(other, folder, left_out)
+    if strips is None:
+        return texts
+    for number in (k for k in range(strips.settings) if k != strips.chosen):
+        with suppress(InputError):
+            other = in_setting(made, strips, number)
+            build_chamber(other.design)
+            head = f"# Setting {number + 1} of {strips.settings}, beside {DESIGN}, which is "
+            head += f"setting {strips.chosen + 1}.\n"
+            texts[f"setting_{number + 1}.toml"] = head + design_text(other, folder, left_out)
     return texts
 
 

@@ -196,16 +196,16 @@ def _held_otherwise(
         made: the proposal for all of the target, whose holder grips an end of thin metal. It is
             returned where nothing else holds the part better.
     """
-
-    fewer = fewer_fillets(mesh, target)
+    targets = [target, *fewer_fillets(mesh, target)]
     ways: list[tuple[Pose | None, int]] = [("standing", 0)]
-    ways += [(None, number) for number in range(1, len(fewer) + 1)]
+    ways += [(None, number) for number in range(1, len(targets))]
     second: Proposal | None = None  # on which balls would come to rest
     for pose, number in (*ways, *((one, 0) for one in AT_SIDE)):
-        of = fewer[number - 1] if number else target
+        of = targets[number]
         shape = mesh.vertices, mesh.triangles, of.triangles
-        turns, why = propose_pose(*shape)
-        if pose is not None:
+        if pose is None:
+            turns, why = propose_pose(*shape)
+        else:
             turns, why = pose_by_size(*shape, pose), NOT_THIN
             if turns[:2] == made.design.part.rotate_deg[:2]:
                 continue
