@@ -543,7 +543,7 @@ def plugs_of(design: Design, part: Part) -> list[Plug]:
     mask, file = design.mask, part.file
     if mask is None or not mask.plugs or mask.at.surface != ("all",) or file is None:
         return []
-    mesh = file.simulated if file.original is None else file.original
+    mesh = file.as_read
     plugs = []
     for piece in pieces_of(mesh.triangles, chosen_triangles(mesh, mask.at, "mask.at")):
         walls = mesh.triangles[piece]

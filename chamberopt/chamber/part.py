@@ -134,6 +134,11 @@ class PartOfFile:
     rotation: np.ndarray  # from the file's frame to the chamber's, (3, 3), applied before the shift
     shift: np.ndarray  # [m], (3,)
 
+    @property
+    def as_read(self) -> PartMesh:
+        """The file's own triangles, in its frame."""
+        return self.simulated if self.original is None else self.original
+
 
 @dataclass(frozen=True)
 class Part:

@@ -289,7 +289,7 @@ def _require_chamber(chamber: Chamber) -> None:
     for tag, surface in ((TAG_PART, "part"), (TAG_SONOTRODE, "sonotrode")):
         if not (chamber.tags == tag).any():
             raise ValueError(f"without a {surface} in the cavity")
-    meshes = part.file.simulated, part.file.original or part.file.simulated
+    meshes = part.file.simulated, part.file.as_read
     for unit in (part.unit, *(mesh.unit for mesh in meshes)):
         if unit not in METRES_PER:
             raise ValueError(f"unit {unit!r}")

@@ -50,7 +50,7 @@ def strip_of_target(design: Design, part: Part) -> StripOfTarget | None:
     named = target.surface != ("all",)
     if target.box_mm is None or not target.cut or named or file is None:
         return None
-    mesh = file.simulated if file.original is None else file.original
+    mesh = file.as_read
     whole = target.model_copy(update={"box_mm": None, "cut": False, "reachable": False})
     places = mesh.vertices[np.unique(mesh.triangles[of_target(mesh, whole)])]
     first, last = places.min(axis=0), places.max(axis=0)

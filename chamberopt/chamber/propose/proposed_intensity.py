@@ -326,7 +326,8 @@ def usual_for(made: Proposal) -> WantedIntensity:
 
     Raises InputError if none is.
     """
-    metal, thickness = (alloy(made.tables["materials"]["part"]), _thickness(made))
+    metal = alloy(made.tables["materials"]["part"])
+    thickness = thickness_under_target(made.chamber.part)
     found = usual_intensity(metal, thickness)
     if found is None:
         raise InputError(f"--intensity: given usual, but {why_none(metal, thickness)}")
@@ -339,7 +340,8 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
     Args:
         predicted: by a pilot; None if it is not known.
     """
-    metal, thickness = (alloy(made.tables["materials"]["part"]), _thickness(made))
+    metal = alloy(made.tables["materials"]["part"])
+    thickness = thickness_under_target(made.chamber.part)
     expected = "not known: the pilot left hardly a dent"
     if predicted is not None:
         expected = f"expected {_with_strip(predicted)}"
@@ -377,7 +379,8 @@ def with_thin_places(made: Proposal) -> Proposal:
 
 def is_off(made: Proposal, predicted: PredictedIntensity | None) -> bool:
     """Return whether the expected intensity lies outside of the usual range, if there is one."""
-    usual = usual_intensity(alloy(made.tables["materials"]["part"]), _thickness(made))
+    metal = alloy(made.tables["materials"]["part"])
+    usual = usual_intensity(metal, thickness_under_target(made.chamber.part))
     return usual is not None and predicted is not None and usual.off(predicted.value) != 0.0
 
 
@@ -402,11 +405,6 @@ def _with_strip(predicted: PredictedIntensity) -> str:
     factor = "" if predicted.factor == 1.0 else f", within a factor of {plain(predicted.factor, 2)}"
     of_n = f" ({plain(OVER_A['N'] * predicted.value, 2)} mm on N strips)"
     return f"{plain(predicted.value, 2)} mmA{factor}{of_n if predicted.value < ON_N else ''}"
-
-
-def _thickness(made: Proposal) -> float:
-    """Return the thickness [m] by which an intensity is usual for a proposal's target."""
-    return thickness_under_target(made.chamber.part)
 
 
 def with_prediction(
