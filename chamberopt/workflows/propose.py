@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.first_design import propose, propose_alike
 from chamberopt.chamber.propose.proposal import new_harm
 from chamberopt.chamber.propose.proposed_budget import TooSlowError, measured_budget, with_budget
 from chamberopt.chamber.propose.proposed_intensity import (
@@ -305,7 +305,7 @@ class _Pilots:
             wanted = replace(wanted, may_leave_end=False, thick_pose=pose, without_fillets=fewer)
         way = Way(first, wanted, self._measure(first, is_brief=True))
         self.begin(WAYS)
-        made, wanted, found = propose_quicker(way, self._again, self._briefly)
+        made, wanted, found = propose_quicker(way, self._again, turned_over, self._briefly)
         now = Compared(*propose_second_pose(made, found, self._briefly))
         over = bool(now.made.design.steps)
         is_turned, leaves_end = turns(now.made), now.made.leaves_end
@@ -349,7 +349,8 @@ class _Pilots:
 
     def _for_intensity(self, start: Proposal, sought: _Sought, asked: WantedIntensity) -> Compared:
         """Return a proposal for an intensity, and what a pilot measured of it."""
-        made = propose_intensity(start, sought.wanted, asked, self._again, self._predict)
+        again = partial(self._again, like=start)
+        made = propose_intensity(start, sought.wanted, asked, again, self._predict)
         made = _told(made, sought.reasons)
         return Compared(made, self._measure(made, is_brief=True))
 
@@ -386,7 +387,7 @@ class _Pilots:
             scale: factor on the intensity that the pilot tells.
         """
         try:
-            made = self._again(replace(sought.wanted, ball_mm=setting.ball_mm))
+            made = self._again(replace(sought.wanted, ball_mm=setting.ball_mm), like=now.made)
         except InputError:
             return None
         made = _told(with_amplitude(made, setting), sought.reasons)
@@ -402,9 +403,11 @@ class _Pilots:
     def _briefly(self, made: Proposal, longest: float = math.inf) -> Measured | None:
         return self._measure(made, longest, is_told=False, is_brief=True)
 
-    def _again(self, other: Wanted) -> Proposal:
+    def _again(self, other: Wanted, like: Proposal | None = None) -> Proposal:
+        """Return a proposal for other wishes, in which the part stands as in another if it can."""
+        given = self.path, other, self.choose
         with no_steps():  # those of the first proposal, again
-            made = propose(self.path, other, self.choose)
+            made = propose(*given) if like is None else propose_alike(like, *given)
             return turned_over(made) if other.turned_over else made
 
     def _measure(

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,6 +41,7 @@ from chamberopt.chamber.propose.proposal import (
     LARGEST_MM,
     REPLICAS,
     Proposal,
+    Stance,
     Tables,
     Wanted,
     checked,
@@ -58,7 +59,6 @@ from chamberopt.chamber.propose.proposed_arbor import (
 from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball, sizes_to_try
 from chamberopt.chamber.propose.proposed_clamp import clamped_outside, grips_poorly
 from chamberopt.chamber.propose.proposed_end import (
-    HeldEnd,
     Shape,
     bare_end,
     can_be_clamped,
@@ -132,11 +132,19 @@ START = "NOT MEASURED by a pilot, a start"
 FEWER = "so that a strip of it takes few sonotrodes"
 NOT_THIN = "so that it is held by an end of thicker metal"
 ON_END = "on end, as no single sonotrode is large enough for it lying"
+Chooser = Callable[[Sequence[Surface]], Sequence[str]]
 
 
-def propose(
-    path: Path, wanted: Wanted, choose: Callable[[Sequence[Surface]], Sequence[str]]
-) -> Proposal:
+class _Given(NamedTuple):
+    """A part, and what is wished of a design for it."""
+
+    path: Path
+    wanted: Wanted
+    mesh: PartMesh
+    known: Sequence[Surface]
+
+
+def propose(path: Path, wanted: Wanted, choose: Chooser) -> Proposal:
     """Propose a design for the part in a file.
 
     Args:
@@ -153,49 +161,62 @@ def propose(
     if wanted.without_fillets:
         target = fewer_fillets(mesh, target)[wanted.without_fillets - 1]
     _require_near_origin(path, target)
+    given = _Given(path, wanted, mesh, known)
     shape = Shape(mesh.vertices, mesh.triangles, target.triangles)
     if wanted.pose is None:
-        turns, pose_reason = propose_pose(*shape)
+        stance = Stance(target, *propose_pose(*shape))
     else:
-        turns = pose_by_size(*shape, wanted.pose)
-        pose_reason = f"{wanted.pose.replace('-', ' ')}, as asked"
+        as_asked = f"{wanted.pose.replace('-', ' ')}, as asked"
+        stance = Stance(target, pose_by_size(*shape, wanted.pose), as_asked)
     keeps_target = bool(asked) or not wanted.may_leave_end
     if wanted.pose in AT_SIDE:
-        return _lying(path, wanted, mesh, known, target, turns, pose_reason, keeps_target)
+        return _lying(given, stance, keeps_target)
     if wanted.pose is None and wanted.thick_pose is not None:
-        turns = pose_by_size(*shape, wanted.thick_pose)
-        return _proposed(path, wanted, mesh, known, target, turns, NOT_THIN, None)
-    end = None if keeps_target else held_end(mesh, target, turns)
-    made = _proposed(path, wanted, mesh, known, target, turns, pose_reason, end)
+        return _proposed(given, Stance(target, pose_by_size(*shape, wanted.thick_pose), NOT_THIN))
+    end = None if keeps_target else held_end(mesh, target, stance.turns)
+    made = _proposed(given, stance._replace(end=end))
     if wanted.pose is None and is_held_thinly(made):
-        return _held_otherwise(path, wanted, mesh, known, target, made)
+        return _held_otherwise(given, target, made)
     if end is not None and "holder" not in made.tables:  # nothing holds the end: it is peened too
-        return _proposed(path, wanted, mesh, known, target, turns, pose_reason, None)
+        return _proposed(given, stance)
     if keeps_target or wanted.pose or end is not None or not hangs_by_a_face(made):
         return made
     end = held_end(mesh, target, made.design.part.rotate_deg, of_any=True)
     if end is not None:
         with suppress(InputError):
-            other = _proposed(path, wanted, mesh, known, target, turns, ON_END, end)
+            other = _proposed(given, stance._replace(why=ON_END, end=end))
             if "holder" in other.tables and faults(other) <= faults(made):
                 return other
     return made
 
 
-def _held_otherwise(
-    path: Path,
-    wanted: Wanted,
-    mesh: PartMesh,
-    known: Sequence[Surface],
-    target: Target,
-    made: Proposal,
-) -> Proposal:
+def propose_alike(like: Proposal, path: Path, wanted: Wanted, choose: Chooser) -> Proposal:
+    """Propose a design in which the part stands and is held as in another one, where that can be.
+
+    Args:
+        like: the other one, such as with other balls.
+        path, wanted, choose: those of propose.
+    """
+    if like.stance is not None:
+        with suppress(InputError):
+            given = _Given(path, wanted, like.mesh, like.known)
+            made = _proposed(given, like.stance, like)
+            is_held = "holder" in made.tables or "holder" not in like.tables
+            if is_held and made.sonotrode_count <= like.sonotrode_count:
+                return replace(
+                    made, without_fillets=like.without_fillets, thick_pose=like.thick_pose
+                )
+    return propose(path, wanted, choose)
+
+
+def _held_otherwise(given: _Given, target: Target, made: Proposal) -> Proposal:
     """Return a proposal in whose pose, or with fewer fillets as its target, an end holds the part.
 
     Args:
         made: the proposal for all of the target, whose holder grips an end of thin metal. It is
             returned where nothing else holds the part better.
     """
+    mesh = given.mesh
     targets = [target, *fewer_fillets(mesh, target)]
     ways: list[tuple[Pose | None, int]] = [("standing", 0)]
     ways += [(None, number) for number in range(1, len(targets))]
@@ -210,7 +231,7 @@ def _held_otherwise(
             if turns[:2] == made.design.part.rotate_deg[:2]:
                 continue
         with suppress(InputError):
-            other = _proposed(path, wanted, mesh, known, of, turns, why, None)
+            other = _proposed(given, Stance(of, turns, why))
             other = replace(other, without_fillets=number, thick_pose=pose)
             is_held = is_firm(other) and not grips_poorly(other) and not is_held_thinly(other)
             if not is_held or len(other.jams) > len(made.jams):
@@ -221,30 +242,19 @@ def _held_otherwise(
     return second or made
 
 
-def _lying(
-    path: Path,
-    wanted: Wanted,
-    mesh: PartMesh,
-    known: Sequence[Surface],
-    target: Target,
-    turns: Turns,
-    reason: str,
-    keeps_target: bool,
-) -> Proposal:
+def _lying(given: _Given, stance: Stance, keeps_target: bool) -> Proposal:
     """Return a proposal for a part that lies, held at its side.
 
     Where it is not held firmly otherwise, an end is left out of a target that reaches both ends, if
     it may be changed.
-
-    Args:
-        turns, reason: the pose [degrees], and why.
     """
+    mesh, target, turns = given.mesh, stance.target, stance.turns
     upright = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, "standing")
     by_root: Proposal | None = None
     if (bare := bare_end(mesh, target, upright)) is not None:
         with suppress(InputError):
             root = bare._replace(turns=turns, goes_out=True)
-            made = _proposed(path, wanted, mesh, known, target, turns, reason, root)
+            made = _proposed(given, stance._replace(end=root))
             if is_firm(made):
                 by_root = made
                 if not rests(by_root):
@@ -254,11 +264,11 @@ def _lying(
     for of_any in (False, True):
         end = None if keeps_target else held_end(mesh, target, upright, of_any)
         lying = None if end is None else end._replace(turns=turns, goes_out=True)
-        made = _proposed(path, wanted, mesh, known, target, turns, reason, lying)
+        made = _proposed(given, stance._replace(end=lying))
         if end is not None or keeps_target or not whole or is_firm(made):
             break
     if end is not None and "holder" not in made.tables:
-        made = _proposed(path, wanted, mesh, known, target, turns, reason, None)
+        made = _proposed(given, stance)
     # Balls that rest on the part speak against a pose, not against what holds it there.
     if by_root is not None and rests(made) and faults(by_root) <= faults(made):
         return by_root
@@ -266,13 +276,7 @@ def _lying(
 
 
 def _in_strips(
-    path: Path,
-    wanted: Wanted,
-    mesh: PartMesh,
-    known: Sequence[Surface],
-    target: Target,
-    poses: dict[Turns, str],
-    ball: float,
+    given: _Given, target: Target, poses: dict[Turns, str], ball: float
 ) -> Proposal | None:
     """Return the proposal for a strip of a target that takes the fewest sonotrodes, of few faults.
 
@@ -282,36 +286,27 @@ def _in_strips(
         poses: the poses that are tried [degrees], and why each is taken.
         ball: diameter of the balls [m].
     """
-    shop, found = wanted.shop or usual_shop(), []
+    shop, found = given.wanted.shop or usual_shop(), []
     sides = [side for one in shop.sonotrodes if one.size_mm for side in one.size_mm]
     longest = 1e-3 * max(sides, default=0.0) - 2.0 * AT_WALL * ball - ROUNDED
     for turns, why in poses.items():
-        if (end := strip(mesh, target, turns, longest)) is not None:
+        if (end := strip(given.mesh, target, turns, longest)) is not None:
             with suppress(InputError):
-                made = _proposed(path, wanted, mesh, known, target, turns, why, end)
+                made = _proposed(given, Stance(target, turns, why, end))
                 if made.design.sonotrode.face and made.sonotrode_count <= SEVERAL:
                     found.append(made)
     return min(found, key=lambda one: (one.sonotrode_count, *faults(one)), default=None)
 
 
-def _proposed(
-    path: Path,
-    wanted: Wanted,
-    mesh: PartMesh,
-    known: Sequence[Surface],
-    target: Target,
-    turns: Turns,
-    pose_reason: str,
-    end: HeldEnd | None,
-) -> Proposal:
+def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Proposal:
     """Return a proposal for a target of a part.
 
     Raises InputError if no chamber can be built round it.
 
     Args:
-        turns, pose_reason: the pose that suits the target [degrees], and why.
-        end: an end that is left out of the target, or all beside a strip of it, and the pose.
+        like: a proposal in this stance, whose holder and pad are tried first.
     """
+    (path, wanted, mesh, known), (target, turns, pose_reason, end, is_local) = given, stance
     part_alloy, shop = alloy(wanted.alloy or USUAL_PART).name, wanted.shop or usual_shop()
     shot, shot_reason = _shot(wanted.shot, part_alloy, shop)
     whole = target
@@ -358,7 +353,7 @@ def _proposed(
         for one in AT_SIDE if wanted.pose is None else ():
             pose = pose_by_size(mesh.vertices, mesh.triangles, whole.triangles, one)
             poses.setdefault(pose, FEWER)
-        in_strips = _in_strips(path, wanted, mesh, known, whole, poses, diameter)
+        in_strips = _in_strips(given, whole, poses, diameter)
         if in_strips is not None:
             return in_strips
     is_guessed = any(f"({BY_SIZE})" in note for note in mesh.notes)
@@ -434,42 +429,49 @@ def _proposed(
 
     spare: tuple[Proposal, Floor] | None = None  # a room of which the part is held badly
     with step("building and checking the chamber") as progress:
-        made, floor = built(is_local=goes_out)
-        if not goes_out and (not floor.is_one_sonotrode or made.is_capped):
+        is_local |= goes_out
+        made, floor = built(is_local)
+        is_large = not floor.is_one_sonotrode or made.is_capped
+        if is_large and not is_local and like is None:
             with suppress(InputError):
                 local, its_floor = built(is_local=True)
                 if its_floor.is_one_sonotrode and not local.is_capped:
                     if not local.chamber.pieces_in_air:
                         local = clamped_outside(local, its_floor, wanted.shop)
-                        local = padded(local, its_floor, target, wanted.shop)
+                        local = padded(local, its_floor, target, wanted.shop, like)
                     if grips_poorly(local):
                         spare = local, its_floor
                     elif faults(local) <= faults(made):
-                        made, floor = local, its_floor
+                        made, floor, is_local = local, its_floor, True
     if made.chamber.pieces_in_air:
         with step("choosing what holds the part") as progress:
             above = None if goes_out else end
-            made = held(made, floor, target, above, bores, wanted.shop, progress)
+            made = held(made, floor, target, above, bores, wanted.shop, progress, like)
     elif "holder" not in made.tables:
         made = clamped_outside(made, floor, wanted.shop)
     is_small = floor.face is not None and made.sonotrode_count <= FEW
     is_good = is_small and "holder" in made.tables
     if spare is not None and not is_good and faults(spare[0]) <= faults(made):
-        made, floor = spare
+        (made, floor), is_local = spare, True
     if turning is not None:
         with step("trying it on its axis, turning") as progress, suppress(InputError):
             other, its_floor = built(is_local=False, turning=turning)
             other = held(other, its_floor, target, None, [turning], wanted.shop, progress)
             as_good = (*faults(other), *its_floor.excess) <= (*faults(made), *floor.excess)
             if as_good and "holder" in other.tables:
-                made, floor = other, its_floor
+                made, floor, is_local = other, its_floor, False
     holes = find_bores(mesh, target.triangles, for_arbor=False)
-    made = padded(masked(made, floor, holes, wanted.shop), floor, target, wanted.shop)
+    made = padded(masked(made, floor, holes, wanted.shop), floor, target, wanted.shop, like)
     made = only_touched(made, floor, wanted.shop)
     if wanted.ball_mm is not None and touched_share(made) < LEAST_TOUCHED:
         raise InputError(_too_large(made, shop.stock_mm(shot)))
     left_out = end is not None and end.target is not whole
-    made = replace(made, reasons={**made.reasons, **_room_reason(made, floor)}, leaves_end=left_out)
+    made = replace(
+        made,
+        reasons={**made.reasons, **_room_reason(made, floor)},
+        leaves_end=left_out,
+        stance=Stance(whole, turns, pose_reason, end, is_local),
+    )
     if spare is None or end is not None or wanted.pose is not None or not grips_poorly(made):
         return made
     upright = pose_by_size(mesh.vertices, mesh.triangles, target.triangles, "standing")
@@ -477,7 +479,7 @@ def _proposed(
     for pose, why, root in ((turns, pose_reason, by_root), (upright, ON_END, None)):
         if root is not None or pose != turns:
             with suppress(InputError):
-                other = _proposed(path, wanted, mesh, known, target, pose, why, root)
+                other = _proposed(given, Stance(target, pose, why, root))
                 is_better = is_firm(other) and not grips_poorly(other) and not rests(other)
                 if is_better and other.sonotrode_count <= made.sonotrode_count:
                     return other

@@ -63,6 +63,7 @@ def held(
     bores: Sequence[Bore],
     shop: Shop | None,
     progress: Progress,
+    like: Proposal | None = None,
 ) -> Proposal:
     """Return a proposal with the first holder that does no harm, or without one and the reason.
 
@@ -70,6 +71,7 @@ def held(
         free: the proposal without a holder.
         end: an end that is left out of the target to hold the part by, if there is one.
         bores: bores that may take an arbor.
+        like: a proposal whose holder is tried first.
     """
     diameter, turns = free.design.shot.diameter, free.design.part.rotate_deg
     choices = holder_choices(free.mesh, target.triangles, turns, diameter, bores)[:MOST_HOLDERS]
@@ -78,6 +80,8 @@ def held(
         choices = choices if one is None else [one.with_keys({"at": end.at})]
     why = "" if choices else NO_PLACE[bool(target.triangles.all())]
     choices = [one._replace(keys=keys) for one in choices for keys in (one.keys, *one.thinner)]
+    if like is not None:
+        choices.sort(key=lambda one: not _is_same(one.keys, like.tables.get("holder", {})))
     tried = [*product((HIDDEN, MOST_HIDDEN), choices)]
     for number, (hidden, one) in enumerate(tried):
         progress(number, len(tried), None)
@@ -93,6 +97,11 @@ def held(
         why = why or harm
     text = f"sonotrode to ceiling; NOTHING HOLDS THE PART: {why}"
     return replace(free, reasons={**free.reasons, "chamber.height_mm": text})
+
+
+def _is_same(keys: dict[str, Any], others: dict[str, Any]) -> bool:
+    """Return whether two holders are of one kind and at one place, whatever their sizes."""
+    return all(keys.get(key) == others.get(key) for key in ("kind", "at", "axis"))
 
 
 def hangs_by_a_face(made: Proposal) -> bool:
@@ -125,16 +134,24 @@ def rests(made: Proposal) -> bool:
     return any(one.kind is WarningKind.REST and PART in one.about for one in made.warnings)
 
 
-def padded(made: Proposal, floor: Floor, target: Target, shop: Shop | None) -> Proposal:
+def padded(
+    made: Proposal, floor: Floor, target: Target, shop: Shop | None, like: Proposal | None = None
+) -> Proposal:
     """Return a proposal with a pad on the level top of a part on which balls would come to rest.
 
     The pad goes up to the ceiling. It holds nothing: a part without a holder gets none. Where a pad
     would do harm, the proposal stays as it is.
+
+    Args:
+        like: a proposal whose pad is tried first.
     """
     if "mask" in made.tables or "holder" not in made.tables or not rests(made):
         return made
     diameter, turns = made.design.shot.diameter, made.design.part.rotate_deg
-    for at in pads(made.mesh, target.triangles, turns, diameter):
+    places = pads(made.mesh, target.triangles, turns, diameter)
+    if like is not None:
+        places.sort(key=lambda at: at != like.tables.get("mask", {}).get("at"))
+    for at in places:
         tables = _with_mask(made.tables, {"axis": [0.0, 0.0, 1.0], "at": at})
         text = "a pad on the level top, up to the ceiling: no ball lies there"
         height = "sonotrode to ceiling; a pad on the part's top goes on to it"

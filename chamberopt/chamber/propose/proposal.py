@@ -12,12 +12,12 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import first_warnings, shot_reach, touched, warnings
 from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
 from chamberopt.chamber.checks.warning import UNPEENED, DesignWarning, WarningKind
-from chamberopt.chamber.propose.pose import Pose
+from chamberopt.chamber.propose.pose import Pose, Turns
 from chamberopt.chamber.propose.proposed_balls import MOST_BALLS, SizeFit, charge_of
-from chamberopt.chamber.propose.proposed_end import Strips
+from chamberopt.chamber.propose.proposed_end import HeldEnd, Strips
 from chamberopt.chamber.propose.proposed_floor import Floor
 from chamberopt.chamber.propose.proposed_sizes import Sizes
-from chamberopt.chamber.propose.proposed_target import Surface
+from chamberopt.chamber.propose.proposed_target import Surface, Target
 from chamberopt.chamber.scene import MAX_BALLS, chamber_mesh
 from chamberopt.chamber.shop import Shop, ShopSonotrode
 from chamberopt.common.errors import InputError
@@ -80,6 +80,16 @@ class Wanted:
     thick_pose: Pose | None = None
 
 
+class Stance(NamedTuple):
+    """How a part stands in its chamber, and what of it is peened there."""
+
+    target: Target  # of which `end` leaves something out
+    turns: Turns  # [degrees]
+    why: str  # it is turned so
+    end: HeldEnd | None = None  # an end that is left out, or all beside a strip
+    is_local: bool = False  # true if the chamber is round the target, and the part goes out
+
+
 @dataclass(frozen=True)
 class BallTrial:
     """What is known of balls of one size for a proposal's target, each size in its own chamber.
@@ -122,6 +132,7 @@ class Proposal:
     jams: tuple[JamGap, ...]  # gaps of chamber and part in which the balls jam
     sonotrode: ShopSonotrode  # whose face carries the chamber
     strips: Strips | None = None  # of which the target is one
+    stance: Stance | None = None  # None until all of it is chosen
     # True if its chamber holds fewer balls than it should, as more take too long.
     is_capped: bool = False
     without_fillets: int = 0  # those of Wanted, to propose the same again

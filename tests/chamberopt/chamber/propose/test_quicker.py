@@ -108,9 +108,9 @@ def test_a_quick_design_is_not_tried_in_other_ways(poses: dict[Pose | None, Prop
         raise AssertionError
 
     first = Way(poses[None], Wanted("mm"), measured(500.0))
-    assert propose_quicker(first, again, lambda *_: measured(1.0)) is first
+    assert propose_quicker(first, again, turned_over, lambda *_: measured(1.0)) is first
     unknown = first._replace(found=None)
-    assert propose_quicker(unknown, again, lambda *_: measured(1.0)) is unknown
+    assert propose_quicker(unknown, again, turned_over, lambda *_: measured(1.0)) is unknown
 
 
 def test_the_quicker_pose_is_taken_and_all_times_are_told(
@@ -118,7 +118,7 @@ def test_the_quicker_pose_is_taken_and_all_times_are_told(
 ) -> None:
     first = Way(poses[None], Wanted("mm"), measured(2024.0))
     measure = pilots({None: 2024.0, "lying": 900.0, "on-edge": 512.0})
-    best = propose_quicker(first, lambda one: poses[one.pose], measure)
+    best = propose_quicker(first, lambda one: poses[one.pose], turned_over, measure)
     assert best.wanted.pose == "on-edge"
     assert best.found == measured(512.0)
     told = best.made.reasons["part.rotate_deg"]
@@ -131,17 +131,13 @@ def test_a_lying_part_on_which_balls_would_rest_is_tried_turned_over(
 ) -> None:
     lying = poses["lying"]
     assert rests(lying)
-
-    def again(wanted: Wanted) -> Proposal:
-        made = poses[wanted.pose]
-        return turned_over(made) if wanted.turned_over else made
-
     of_one_pose = pilots({None: 2024.0, "lying": 100.0, "on-edge": 1900.0})
 
     def measure(made: Proposal, longest: float) -> Measured:
         return measured(400.0) if made.design.steps else of_one_pose(made, longest)
 
-    best = propose_quicker(Way(poses[None], Wanted("mm"), measured(2024.0)), again, measure)
+    first = Way(poses[None], Wanted("mm"), measured(2024.0))
+    best = propose_quicker(first, lambda one: poses[one.pose], turned_over, measure)
     assert best.wanted == Wanted("mm", pose="lying", turned_over=True)
     assert best.found == measured(400.0)
     assert "lying and turned over on" in best.made.reasons["part.rotate_deg"]
@@ -173,7 +169,7 @@ def test_more_sonotrodes_must_save_more_time(poses: dict[Pose | None, Proposal])
     for share, taken in ((0.85 / count, None), (0.75 / count, "on-edge")):
         first = Way(poses[None], Wanted("mm"), measured(1000.0))
         measure = pilots({None: 1000.0, "lying": 2000.0, "on-edge": share * 1000.0})
-        best = propose_quicker(first, lambda one: poses[one.pose], measure)
+        best = propose_quicker(first, lambda one: poses[one.pose], turned_over, measure)
         assert best.wanted.pose == taken
         told = "(not quick enough for more sonotrodes)" in best.made.reasons["part.rotate_deg"]
         assert told is (taken is None)
@@ -186,7 +182,7 @@ def test_a_time_that_nobody_would_run_is_worth_some_sonotrodes(
     for alone, beside, taken in ((1700.0, 840.0, None), (2000.0, 990.0, "on-edge")):
         times: dict[Pose | None, float] = {None: alone, "lying": 1990.0, "on-edge": beside}
         first = Way(poses[None], Wanted("mm"), measured(alone))
-        best = propose_quicker(first, lambda one: poses[one.pose], pilots(times))
+        best = propose_quicker(first, lambda one: poses[one.pose], turned_over, pilots(times))
         assert best.wanted.pose == taken
 
 
@@ -198,6 +194,7 @@ def test_a_quicker_way_is_no_weaker(poses: dict[Pose | None, Proposal]) -> None:
         best = propose_quicker(
             first,
             lambda one: poses[one.pose],
+            turned_over,
             lambda *given, m=measure, x=value: with_intensity(m(*given), x),
         )
         assert best.wanted.pose == taken
@@ -215,7 +212,9 @@ def test_a_whole_layer_is_taken_where_it_is_quicker(
     poses: dict[Pose | None, Proposal], share: float
 ) -> None:
     first = Way(poses[None], Wanted("mm", pose="standing"), measured(1000.0))
-    best = propose_quicker(first, lambda _: poses[None], lambda *_: measured(1000.0 * share))
+    best = propose_quicker(
+        first, lambda _: poses[None], turned_over, lambda *_: measured(1000.0 * share)
+    )
     count = first.made.design.shot.count
     if share == 0.9:
         assert best is first
