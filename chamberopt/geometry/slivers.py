@@ -8,10 +8,12 @@ sliver.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from chamberopt.geometry.solids import SolidSurface
-from chamberopt.geometry.triangles import area_vectors, heights
+from chamberopt.geometry.triangles import heights
 
 # m: a thousand times the rounding of a boolean at 100 mm, a millionth of the smallest ball.
 MIN_HEIGHT = 1e-9
@@ -40,23 +42,45 @@ def remove_slivers(surface: SolidSurface) -> SolidSurface:
     return mesh.surface()
 
 
+class _Around(dict[int, set[int]]):
+    """The triangles at each vertex, found when they are first asked for."""
+
+    def __init__(self, triangles: np.ndarray) -> None:
+        super().__init__()
+        corners = triangles.ravel()
+        self._order = np.argsort(corners, kind="stable") // 3
+        self._ends = np.searchsorted(np.sort(corners), np.arange(corners.max() + 2))
+
+    def __missing__(self, vertex: int) -> set[int]:
+        own = set(self._order[self._ends[vertex] : self._ends[vertex + 1]].tolist())
+        self[vertex] = own
+        return own
+
+
 class _EditableMesh:
-    """Closed surface that keeps track of neighbours while triangles come and go."""
+    """Closed surface that keeps track of neighbours while triangles come and go.
+
+    It reckons with plain numbers: for one triangle at a time they are far quicker than arrays.
+    """
 
     def __init__(self, surface: SolidSurface, slivers: list[int]) -> None:
         self.vertices = surface.vertices
+        self.places: list[list[float]] = surface.vertices.tolist()
         self.solid, self.source = surface.solid.copy(), surface.source.copy()
-        self.triangles: dict[int, Triangle] = {}
+        columns = surface.triangles.T.tolist()
+        self.triangles: dict[int, Triangle] = dict(enumerate(zip(*columns, strict=True)))
         self.of_edge: dict[tuple[int, int], int] = {}
-        self.of_vertex: dict[int, set[int]] = {}
+        for first, second in ((0, 1), (1, 2), (2, 0)):
+            self.of_edge.update(
+                zip(zip(columns[first], columns[second], strict=True), self.triangles, strict=True)
+            )
+        self.of_vertex = _Around(surface.triangles)
         # the slivers, and the triangles that are made while slivers are removed
         self.candidates = slivers
-        for index, (a, b, c) in enumerate(surface.triangles.tolist()):
-            self._add(index, (a, b, c))
 
     def slivers(self) -> list[int]:
         """Return the indices of the triangles that are now lower than MIN_HEIGHT."""
-        present = (k for k in dict.fromkeys(self.candidates) if k in self.triangles)
+        present = [k for k in dict.fromkeys(self.candidates) if k in self.triangles]
         return [k for k in present if self._height(self.triangles[k]) < MIN_HEIGHT]
 
     def surface(self) -> SolidSurface:
@@ -124,22 +148,34 @@ class _EditableMesh:
 
         This holds if the pair is a convex quadrilateral.
         """
-        facing = area_vectors(self.vertices, np.array(old)).sum(axis=0)
-        return all(float(v @ facing) > 0.0 for v in area_vectors(self.vertices, np.array(new)))
+        facing = [sum(axis) for axis in zip(*map(self._area_vector, old), strict=True)]
+        return all(_dot(self._area_vector(one), facing) > 0.0 for one in new)
 
     def _apex_on(self, a: int, b: int, c: int) -> bool:
         """Return True if vertex c is within MIN_HEIGHT of the edge a-b, between its ends."""
-        along, to_apex = self.vertices[b] - self.vertices[a], self.vertices[c] - self.vertices[a]
-        length = float(np.linalg.norm(along))
-        if length == 0.0 or not 0.0 < float(to_apex @ along) < length * length:
+        along, to_apex = self._from(a, b), self._from(a, c)
+        length = math.hypot(*along)
+        if length == 0.0 or not 0.0 < _dot(to_apex, along) < length * length:
             return False
-        return float(np.linalg.norm(np.cross(along, to_apex))) < MIN_HEIGHT * length
+        return math.hypot(*_cross(along, to_apex)) < MIN_HEIGHT * length
 
     def _height(self, triangle: Triangle) -> float:
-        return float(heights(self.vertices, np.array([triangle]))[0])
+        """Return the smallest height of a triangle [m]; 0 if it has no area."""
+        longest = max(self._length(*edge) for edge in _edges(triangle))
+        if longest == 0.0:
+            return 0.0
+        return 2.0 * math.hypot(*self._area_vector(triangle)) / longest
+
+    def _area_vector(self, triangle: Triangle) -> list[float]:
+        a, b, c = triangle
+        return [0.5 * one for one in _cross(self._from(a, b), self._from(a, c))]
+
+    def _from(self, a: int, b: int) -> list[float]:
+        """Return the vector from one vertex to another [m]."""
+        return [y - x for x, y in zip(self.places[a], self.places[b], strict=True)]
 
     def _length(self, a: int, b: int) -> float:
-        return float(np.linalg.norm(self.vertices[a] - self.vertices[b]))
+        return math.dist(self.places[a], self.places[b])
 
     def _corners(self, indices: set[int]) -> set[int]:
         return {corner for index in indices for corner in self.triangles[index]}
@@ -148,7 +184,7 @@ class _EditableMesh:
         self.triangles[index] = triangle
         for edge in _edges(triangle):
             self.of_edge[edge] = index
-            self.of_vertex.setdefault(edge[0], set()).add(index)
+            self.of_vertex[edge[0]].add(index)
 
     def _remove(self, index: int) -> None:
         for edge in _edges(self.triangles.pop(index)):
@@ -159,3 +195,11 @@ class _EditableMesh:
 def _edges(triangle: Triangle) -> tuple[tuple[int, int], ...]:
     a, b, c = triangle
     return (a, b), (b, c), (c, a)
+
+
+def _dot(a: list[float], b: list[float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: list[float], b: list[float]) -> list[float]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
