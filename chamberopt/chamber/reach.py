@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import OrderedDict
 from dataclasses import dataclass
+from threading import Lock
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -268,8 +269,9 @@ class Reach:
 # The latest reaches, by a digest of all on which they depend. A chamber takes its own several
 # times: to choose a target, to check each step, to draw, and, of a proposal, to see whether a
 # target that the shot reaches is worth proposing.
-MOST_KNOWN = 4
+MOST_KNOWN = 8
 _known: OrderedDict[bytes, Reach] = OrderedDict()
+_of_known = Lock()  # threads check chambers at once
 
 
 def find_reach(
@@ -298,10 +300,13 @@ def find_reach(
         if array is not None:
             digest.update(f"{array.dtype} {array.shape}".encode() + array.tobytes())
     key = digest.digest()
-    found = _known.pop(key, None) or _find_reach(mesh, diameter, max_radius, normals)
-    _known[key] = found  # as the latest
-    while len(_known) > MOST_KNOWN:
-        _known.popitem(last=False)
+    with _of_known:
+        found = _known.pop(key, None)
+    found = found or _find_reach(mesh, diameter, max_radius, normals)
+    with _of_known:
+        _known[key] = found  # as the latest
+        while len(_known) > MOST_KNOWN:
+            _known.popitem(last=False)
     return found
 
 

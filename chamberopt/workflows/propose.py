@@ -34,7 +34,7 @@ from chamberopt.chamber.propose.proposed_intensity import (
     with_time,
 )
 from chamberopt.chamber.propose.proposed_mask import LeftOut, find_left_out, in_setting
-from chamberopt.chamber.propose.proposed_setting import Setting, setting_of, with_amplitude
+from chamberopt.chamber.propose.proposed_setting import setting_of, with_amplitude
 from chamberopt.chamber.propose.proposed_steps import (
     propose_second_pose,
     turned_over,
@@ -305,7 +305,7 @@ class _Pilots:
             wanted = replace(wanted, may_leave_end=False, thick_pose=pose, without_fillets=fewer)
         way = Way(first, wanted, self._measure(first, is_brief=True))
         self.begin(WAYS)
-        made, wanted, found = propose_quicker(way, self._again, turned_over, self._briefly)
+        made, wanted, found = propose_quicker(way, self._each, turned_over, self._briefly)
         now = Compared(*propose_second_pose(made, found, self._briefly))
         over = bool(now.made.design.steps)
         is_turned, leaves_end = turns(now.made), now.made.leaves_end
@@ -372,25 +372,22 @@ class _Pilots:
             found = found._replace(intensity=made.predicted)
         now = Compared(made, found)
         settings = settings_beside(made, sought.wanted, sought.asked, found, by_geometry)
-        tried = [self._compared(setting, now, sought, scale) for setting in settings]
-        return now, [one for one in tried if one is not None]
+        wishes = [replace(sought.wanted, ball_mm=one.ball_mm) for one in settings]
+        each = zip(self._each(wishes, now.made), settings, strict=True)
+        tried = [
+            self._compared(with_amplitude(_told(made, sought.reasons), one), now, sought, scale)
+            for made, one in each
+            if made is not None
+        ]
+        return now, tried
 
-    def _compared(
-        self, setting: Setting, now: Compared, sought: _Sought, scale: float
-    ) -> Compared | None:
+    def _compared(self, made: Proposal, now: Compared, sought: _Sought, scale: float) -> Compared:
         """Return a proposal with other balls and what a pilot measured of it.
-
-        It is None where no chamber can be built for them.
 
         Args:
             now: the proposal that they are compared with.
             scale: factor on the intensity that the pilot tells.
         """
-        try:
-            made = self._again(replace(sought.wanted, ball_mm=setting.ball_mm), like=now.made)
-        except InputError:
-            return None
-        made = _told(with_amplitude(made, setting), sought.reasons)
         if harm := new_harm(made, now.made):
             return Compared(made, None, harm.beginning)
         found = self._briefly(made)
@@ -402,6 +399,23 @@ class _Pilots:
 
     def _briefly(self, made: Proposal, longest: float = math.inf) -> Measured | None:
         return self._measure(made, longest, is_told=False, is_brief=True)
+
+    def _each(
+        self, wishes: Sequence[Wanted], like: Proposal | None = None
+    ) -> list[Proposal | None]:
+        """Return the proposal for each of some wishes; None where no chamber can be built.
+
+        Threads make them: most of the work is done without Python's global lock.
+        """
+
+        def one(wanted: Wanted) -> Proposal | None:
+            try:
+                return self._again(wanted, like)
+            except InputError:
+                return None
+
+        with no_steps():
+            return [*self.executor.map(one, wishes)]
 
     def _again(self, other: Wanted, like: Proposal | None = None) -> Proposal:
         """Return a proposal for other wishes, in which the part stands as in another if it can."""

@@ -66,6 +66,8 @@ STRONGER = 1.5
 NOT_OVER = "; not turned over after half of the time"
 Steps = list[dict[str, Any]]
 """The [[steps]] of a design file."""
+Values = Mapping[str, Mapping[str, Any]]
+"""Values of a design file by table and key."""
 
 
 def propose_second_pose(
@@ -118,22 +120,26 @@ def propose_second_pose(
 def turned_over(made: Proposal) -> Proposal:
     """Return a proposal with a second step, turned over, under a ceiling that suits both poses.
 
-    It is turned about the first axis with which the walls have the same openings in both poses,
-    or else about the chamber's x.
+    It is turned about the first axis with which no more balls jam, best about one with which the
+    walls have the same openings in both poses.
 
     Raises InputError if what holds the part does not hold it then.
     """
-    found: list[tuple[int, bool, Proposal, str]] = []
+    moves: dict[str, bool] = {}
     for axis in OVER:
         with suppress(InputError):
+            room = build_chamber(made.design.changed(_changes(*_over(made, axis))))
+            moves[axis] = bool(moved_openings(room))
+    found: list[tuple[int, Proposal, str]] = []
+    for axis in sorted(moves, key=moves.__getitem__):
+        with suppress(InputError):
             two = _turned_about(made, axis)
-            moves = bool(moved_openings(two.chamber))
-            found.append((faults(two)[0], moves, two, axis))
-            if not moves:
+            found.append((faults(two)[0], two, axis))
+            if found[-1][0] <= faults(made)[0]:
                 break
     if not found:
         raise InputError("what holds it in this pose does not hold it turned over")
-    *_, two, axis = min(found, key=lambda one: one[:2])
+    _, two, axis = min(found, key=lambda one: one[0])
     if any(one.pieces_in_air for one in two.chamber.steps) and not made.chamber.pieces_in_air:
         raise InputError("nothing would hold it")
     over = f"turned over about {axis} after half of the time, as what looks up gets few dents"
@@ -165,6 +171,20 @@ def _turned_over(made: Proposal, axis: str, raised: float = 0.0) -> Proposal:
     Raises InputError if the chamber cannot be built round the part in this pose.
 
     Args:
+        axis, raised: those of _over.
+    """
+    two = _with_values(made, *_over(made, axis, raised))
+    if not raised:
+        return two
+    text = "high enough for both poses, so that no ball jams under the ceiling"
+    reason = f"{made.reasons['chamber.height_mm']}; {text}"
+    return replace(two, reasons={**two.reasons, "chamber.height_mm": reason})
+
+
+def _over(made: Proposal, axis: str, raised: float = 0.0) -> tuple[Values, Steps]:
+    """Return the height and the steps of a proposal in which the part is turned over.
+
+    Args:
         axis: of OVER.
         raised: by how many diameters of a ball the ceiling is raised.
     """
@@ -180,16 +200,8 @@ def _turned_over(made: Proposal, axis: str, raised: float = 0.0) -> Proposal:
         offset = over @ made.design.part.offset_mm
         pose["offset_mm"] = [round(float(one), 9) + 0.0 for one in offset]
     height = made.tables["chamber"]["height_mm"] + 1e3 * raised * made.design.shot.diameter
-    two = _with_values(
-        made,
-        {"chamber": {"height_mm": round(height, 1)}},
-        [{"name": "first"}, {"name": "turned_over", "part": pose}],
-    )
-    if not raised:
-        return two
-    text = "high enough for both poses, so that no ball jams under the ceiling"
-    reason = f"{made.reasons['chamber.height_mm']}; {text}"
-    return replace(two, reasons={**two.reasons, "chamber.height_mm": reason})
+    steps: Steps = [{"name": "first"}, {"name": "turned_over", "part": pose}]
+    return {"chamber": {"height_mm": round(height, 1)}}, steps
 
 
 def with_finer_balls(
@@ -325,21 +337,23 @@ def _steps(made: Proposal) -> Steps:
     return list(made.tables.get("", {}).get("steps", []))
 
 
-def _with_values(made: Proposal, values: Mapping[str, Mapping[str, Any]], steps: Steps) -> Proposal:
+def _changes(values: Values, steps: Steps) -> dict[str, Any]:
+    """Return what values and steps change in a design, by dotted name."""
+    changes = {f"{name}.{key}": x for name, one in values.items() for key, x in one.items()}
+    return {**changes, "steps": steps or None}
+
+
+def _with_values(made: Proposal, values: Values, steps: Steps) -> Proposal:
     """Return a proposal with other values and steps in its tables, built and checked again.
 
     Raises InputError if the chamber cannot be built with them.
-
-    Args:
-        values: by table and key.
     """
     tables = {"": {}, **made.tables}
     for name, one in values.items():
         tables[name] = {**tables[name], **one}
     if steps:
         tables[""] = {**tables[""], "steps": steps}
-    changes = {f"{name}.{key}": x for name, one in values.items() for key, x in one.items()}
-    design = made.design.changed({**changes, "steps": steps or None})
+    design = made.design.changed(_changes(values, steps))
     chamber = build_chamber(design)
     jams = (
         tuple(jam_gaps(room, one.shot.diameter, gaps_in_reach(shot_reach(one, room))))

@@ -10,7 +10,7 @@ upper side balls come to rest, or few get to, is tried turned over after half of
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
@@ -46,14 +46,14 @@ class Way(NamedTuple):
 
 def propose_quicker(
     first: Way,
-    again: Callable[[Wanted], Proposal],
+    again: Callable[[Sequence[Wanted]], Sequence[Proposal | None]],
     turned_over: Callable[[Proposal], Proposal],
     measure: Callable[[Proposal, float], Measured | None],
 ) -> Way:
     """Return the way that is quickest by pilots, of those with no more faults than the first.
 
     Args:
-        again: proposes the design for other wishes.
+        again: proposes a design for each of some wishes; None where no chamber can be built.
         turned_over: adds a step in which the part is turned over.
         measure: simulates a proposal briefly; None if that cannot be done. Raises TooSlowError if
             the time to 98 % is longer than a given one [s].
@@ -61,13 +61,20 @@ def propose_quicker(
     best = first
     tried: list[tuple[Way, str]] = []
     if _is_slow(first) and first.wanted.pose is None and not turns(first.made):
+        poses = dict(
+            zip(AT_SIDE, again([replace(first.wanted, pose=one) for one in AT_SIDE]), strict=True)
+        )
         for pose, over in product(AT_SIDE, (False, True)):
             if over and not (tried and _needs_both_sides(tried[-1][0], pose)):
                 continue
             wanted = replace(first.wanted, pose=pose, turned_over=over)
-            try:
-                made = turned_over(tried[-1][0].made) if over else again(wanted)
-            except InputError:
+            made = poses[pose]
+            if over:
+                try:
+                    made = turned_over(tried[-1][0].made)
+                except InputError:
+                    continue
+            if made is None:
                 continue
             if float(_up(made) @ _up(first.made)) > SAME:
                 continue

@@ -1,7 +1,7 @@
 """Poses and charges that are tried by pilots where a treatment takes long."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -104,7 +104,7 @@ def test_a_long_bar_is_held_in_each_pose(poses: dict[Pose | None, Proposal]) -> 
 
 @pytest.mark.long
 def test_a_quick_design_is_not_tried_in_other_ways(poses: dict[Pose | None, Proposal]) -> None:
-    def again(_: Wanted) -> Proposal:
+    def again(_: Sequence[Wanted]) -> list[Proposal | None]:
         raise AssertionError
 
     first = Way(poses[None], Wanted("mm"), measured(500.0))
@@ -118,7 +118,7 @@ def test_the_quicker_pose_is_taken_and_all_times_are_told(
 ) -> None:
     first = Way(poses[None], Wanted("mm"), measured(2024.0))
     measure = pilots({None: 2024.0, "lying": 900.0, "on-edge": 512.0})
-    best = propose_quicker(first, lambda one: poses[one.pose], turned_over, measure)
+    best = propose_quicker(first, of(poses), turned_over, measure)
     assert best.wanted.pose == "on-edge"
     assert best.found == measured(512.0)
     told = best.made.reasons["part.rotate_deg"]
@@ -137,7 +137,7 @@ def test_a_lying_part_on_which_balls_would_rest_is_tried_turned_over(
         return measured(400.0) if made.design.steps else of_one_pose(made, longest)
 
     first = Way(poses[None], Wanted("mm"), measured(2024.0))
-    best = propose_quicker(first, lambda one: poses[one.pose], turned_over, measure)
+    best = propose_quicker(first, of(poses), turned_over, measure)
     assert best.wanted == Wanted("mm", pose="lying", turned_over=True)
     assert best.found == measured(400.0)
     assert "lying and turned over on" in best.made.reasons["part.rotate_deg"]
@@ -169,7 +169,7 @@ def test_more_sonotrodes_must_save_more_time(poses: dict[Pose | None, Proposal])
     for share, taken in ((0.85 / count, None), (0.75 / count, "on-edge")):
         first = Way(poses[None], Wanted("mm"), measured(1000.0))
         measure = pilots({None: 1000.0, "lying": 2000.0, "on-edge": share * 1000.0})
-        best = propose_quicker(first, lambda one: poses[one.pose], turned_over, measure)
+        best = propose_quicker(first, of(poses), turned_over, measure)
         assert best.wanted.pose == taken
         told = "(not quick enough for more sonotrodes)" in best.made.reasons["part.rotate_deg"]
         assert told is (taken is None)
@@ -182,7 +182,7 @@ def test_a_time_that_nobody_would_run_is_worth_some_sonotrodes(
     for alone, beside, taken in ((1700.0, 840.0, None), (2000.0, 990.0, "on-edge")):
         times: dict[Pose | None, float] = {None: alone, "lying": 1990.0, "on-edge": beside}
         first = Way(poses[None], Wanted("mm"), measured(alone))
-        best = propose_quicker(first, lambda one: poses[one.pose], turned_over, pilots(times))
+        best = propose_quicker(first, of(poses), turned_over, pilots(times))
         assert best.wanted.pose == taken
 
 
@@ -193,7 +193,7 @@ def test_a_quicker_way_is_no_weaker(poses: dict[Pose | None, Proposal]) -> None:
         measure = pilots(times)
         best = propose_quicker(
             first,
-            lambda one: poses[one.pose],
+            of(poses),
             turned_over,
             lambda *given, m=measure, x=value: with_intensity(m(*given), x),
         )
@@ -201,6 +201,10 @@ def test_a_quicker_way_is_no_weaker(poses: dict[Pose | None, Proposal]) -> None:
         why = "" if taken else " (weaker)"
         told = f"98 % after about 300 s, {value:g} mmA{why}"
         assert told in best.made.reasons["part.rotate_deg"]
+
+
+def of(poses: dict[Pose | None, Proposal]) -> Callable[[Sequence[Wanted]], list[Proposal | None]]:
+    return lambda many: [poses[one.pose] for one in many]
 
 
 def with_intensity(found: Measured, value: float) -> Measured:
@@ -213,7 +217,10 @@ def test_a_whole_layer_is_taken_where_it_is_quicker(
 ) -> None:
     first = Way(poses[None], Wanted("mm", pose="standing"), measured(1000.0))
     best = propose_quicker(
-        first, lambda _: poses[None], turned_over, lambda *_: measured(1000.0 * share)
+        first,
+        lambda many: [poses[None] for _ in many],
+        turned_over,
+        lambda *_: measured(1000.0 * share),
     )
     count = first.made.design.shot.count
     if share == 0.9:
