@@ -36,6 +36,7 @@ from chamberopt.chamber.propose.proposed_intensity import (
 from chamberopt.chamber.propose.proposed_mask import LeftOut, find_left_out, in_setting
 from chamberopt.chamber.propose.proposed_setting import setting_of, with_amplitude
 from chamberopt.chamber.propose.proposed_steps import (
+    is_worth_a_second_pose,
     propose_second_pose,
     turned_over,
     with_finer_balls,
@@ -337,6 +338,13 @@ class _Pilots:
             if sought.is_wish:
                 raise
             return start, sought._replace(asked=None)
+        is_known = (  # with these balls it was tried, and was not worth it
+            setting_of(now.made).ball_mm == setting_of(start.made).ball_mm
+            and start.found is not None
+            and is_worth_a_second_pose(start.made, start.found)
+        )
+        if is_known:
+            return now, sought
         over, _ = propose_second_pose(now.made, now.found, self._briefly)
         if over.design.steps and not start.made.design.steps:
             other = sought._replace(

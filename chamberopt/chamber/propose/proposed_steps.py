@@ -83,12 +83,10 @@ def propose_second_pose(
         measure: simulates a proposal briefly; None if that cannot be done. Raises TooSlowError if
             the time to 98 % is longer than a given one [s].
     """
-    if found is None or turns(made) or made.design.steps:
+    if found is None or not is_worth_a_second_pose(made, found):
         return made, found
-    is_hidden = not found.places and touched_share(made) < COVERED
+    is_hidden = _is_hidden(made, found)
     longest = math.inf if is_hidden else WORTH * found.time_to_98
-    if not is_hidden and found.time_to_98 < max(SLOW, UNEVEN * found.mean_time):
-        return made, found
 
     def dropped(why: str) -> tuple[Proposal, Measured | None]:
         reason = f"{made.reasons['part.rotate_deg']}{NOT_OVER}: {why}"
@@ -115,6 +113,23 @@ def propose_second_pose(
         f"pose {before}"
     )
     return replace(two, reasons={**two.reasons, ".steps": reason}), after
+
+
+def is_worth_a_second_pose(made: Proposal, found: Measured) -> bool:
+    """Return whether a second step, turned over, is tried for a proposal.
+
+    Args:
+        found: what a pilot measured of it.
+    """
+    if turns(made) or made.design.steps:
+        return False
+    is_uneven = found.time_to_98 >= max(SLOW, UNEVEN * found.mean_time)
+    return is_uneven or _is_hidden(made, found)
+
+
+def _is_hidden(made: Proposal, found: Measured) -> bool:
+    """Return whether balls cannot touch enough of the target in one pose."""
+    return not found.places and touched_share(made) < COVERED
 
 
 def turned_over(made: Proposal) -> Proposal:
