@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from pyvista import Plotter, PolyData
     from trimesh import Trimesh
 
-    from chamberopt.chamber.propose.pose import Pose
+    from chamberopt.chamber.layout.pose import Pose
     from chamberopt.common.progress import Progress
     from chamberopt.design.calibration import Calibration
     from chamberopt.export.formats import FrameName

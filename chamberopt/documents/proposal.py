@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.checks.fillets import OF_FILLET, OF_SLOT
+from chamberopt.chamber.layout.target import area_in_mm2
 from chamberopt.chamber.propose.first_design import START
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
-from chamberopt.chamber.propose.proposed_target import area_in_mm2
 from chamberopt.chamber.propose.text import TO_SETTLE, clauses, to_settle
 from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import in_words
@@ -27,9 +27,9 @@ from chamberopt.peening.strip import StripSize
 from chamberopt.peening.strip_holder import why_no_strip
 
 if TYPE_CHECKING:
+    from chamberopt.chamber.layout.target import Surface
     from chamberopt.chamber.propose.proposal import Proposal
     from chamberopt.chamber.propose.proposed_mask import LeftOut
-    from chamberopt.chamber.propose.proposed_target import Surface
 
 WIDTH, INDENT = 79, 13  # columns
 MOST_LISTED = 6  # surfaces, without --verbose

@@ -12,7 +12,7 @@ import numpy as np
 from chamberopt.chamber.checks.openings import PLATE
 from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.fixture import plugs_in_words, size_in_words
-from chamberopt.chamber.propose.pose import axis_down
+from chamberopt.chamber.layout.pose import axis_down
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.key_words import in_words, key_in_words, title_with_unit, unit_of
 from chamberopt.common.number_text import estimate_text, percent

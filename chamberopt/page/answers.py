@@ -16,13 +16,8 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import first_warnings, notes, shot_reach
 from chamberopt.chamber.checks.facts import describe, first_facts, with_clearance
 from chamberopt.chamber.checks.warning import UNPEENED, DesignWarning, WarningKind
+from chamberopt.chamber.layout.target import Surface, find_surface, named_surfaces, surfaces
 from chamberopt.chamber.part import chosen_on_part, chosen_triangles, named_surface, preview_part
-from chamberopt.chamber.propose.proposed_target import (
-    Surface,
-    find_surface,
-    named_surfaces,
-    surfaces,
-)
 from chamberopt.chamber.reach import reached_part_share
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.number_text import percent, plain

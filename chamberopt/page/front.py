@@ -8,10 +8,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, get_args
 
-from chamberopt.chamber.propose.pose import Pose
+from chamberopt.chamber.layout.pose import Pose
+from chamberopt.chamber.layout.sizes import SHAPES
+from chamberopt.chamber.layout.target import named_surfaces
 from chamberopt.chamber.propose.proposal import Wanted
-from chamberopt.chamber.propose.proposed_sizes import SHAPES
-from chamberopt.chamber.propose.proposed_target import named_surfaces
 from chamberopt.chamber.shop import load_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import check_new_file, read_file, remove_file, write_bytes

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from chamberopt.chamber.layout.pose import square_to_walls, turns_down
+from chamberopt.chamber.layout.sizes import SHAPES, propose_sizes
 from chamberopt.chamber.part import PartPreview, chosen_triangles, preview_part
-from chamberopt.chamber.propose.pose import square_to_walls, turns_down
-from chamberopt.chamber.propose.proposed_sizes import SHAPES, propose_sizes
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.design.part import MAX_FACES, FaceAt, Selection

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from chamberopt.chamber.layout.sizes import SHAPES, propose_sizes
 from chamberopt.chamber.part import chosen_triangles, preview_part
-from chamberopt.chamber.propose.proposed_sizes import SHAPES, propose_sizes
 from chamberopt.common.errors import InputError
 from chamberopt.design import shapes
 from chamberopt.design.design import Design

@@ -61,10 +61,10 @@ from sim_core import SimulationError
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from chamberopt.chamber.layout.target import Surface
     from chamberopt.chamber.propose.proposal import Proposal, Wanted
     from chamberopt.chamber.propose.proposed_budget import Measured
     from chamberopt.chamber.propose.proposed_intensity import IntensityPilot
-    from chamberopt.chamber.propose.proposed_target import Surface
     from chamberopt.workflows.simulate import Teller
 
 USUAL, NONE = "usual", "none"  # in the place of an intensity

@@ -15,6 +15,46 @@ import numpy as np
 
 from chamberopt.chamber.checks.place_names import PART_SIDES, SIDE_WALL
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
+from chamberopt.chamber.layout.arbor import RPM, Bore, find_bores, turning_bore, turning_pose
+from chamberopt.chamber.layout.balls import fit_sizes, propose_ball, sizes_to_try
+from chamberopt.chamber.layout.end import (
+    Shape,
+    bare_end,
+    can_be_clamped,
+    cut_shape,
+    held_end,
+    local_room,
+    root_out,
+    strip,
+)
+from chamberopt.chamber.layout.floor import (
+    OUTSIDE,
+    SEVERAL,
+    Floor,
+    clear_of_face,
+    floor_on_sonotrode,
+    of_blocks,
+    require_room,
+)
+from chamberopt.chamber.layout.pose import (
+    AT_SIDE,
+    Pose,
+    Turns,
+    end_to_wall,
+    hanging_pose,
+    pose_by_size,
+    pose_in_words,
+    propose_pose,
+    square_to_walls,
+)
+from chamberopt.chamber.layout.sizes import middle_in_plan, propose_sizes, shape_for
+from chamberopt.chamber.layout.target import (
+    Surface,
+    Target,
+    fewer_fillets,
+    propose_target,
+    surfaces,
+)
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.propose.held_proposal import (
     hangs_by_a_face,
@@ -25,17 +65,6 @@ from chamberopt.chamber.propose.held_proposal import (
     only_touched,
     padded,
     rests,
-)
-from chamberopt.chamber.propose.pose import (
-    AT_SIDE,
-    Pose,
-    Turns,
-    end_to_wall,
-    hanging_pose,
-    pose_by_size,
-    pose_in_words,
-    propose_pose,
-    square_to_walls,
 )
 from chamberopt.chamber.propose.proposal import (
     LARGEST_MM,
@@ -49,42 +78,7 @@ from chamberopt.chamber.propose.proposal import (
     nested,
     touched_share,
 )
-from chamberopt.chamber.propose.proposed_arbor import (
-    RPM,
-    Bore,
-    find_bores,
-    turning_bore,
-    turning_pose,
-)
-from chamberopt.chamber.propose.proposed_balls import fit_sizes, propose_ball, sizes_to_try
 from chamberopt.chamber.propose.proposed_clamp import clamped_outside, grips_poorly
-from chamberopt.chamber.propose.proposed_end import (
-    Shape,
-    bare_end,
-    can_be_clamped,
-    cut_shape,
-    held_end,
-    local_room,
-    root_out,
-    strip,
-)
-from chamberopt.chamber.propose.proposed_floor import (
-    OUTSIDE,
-    SEVERAL,
-    Floor,
-    clear_of_face,
-    floor_on_sonotrode,
-    of_blocks,
-    require_room,
-)
-from chamberopt.chamber.propose.proposed_sizes import middle_in_plan, propose_sizes, shape_for
-from chamberopt.chamber.propose.proposed_target import (
-    Surface,
-    Target,
-    fewer_fillets,
-    propose_target,
-    surfaces,
-)
 from chamberopt.chamber.shop import HARD, STEEL, Shop, usual_shop
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import step

@@ -15,6 +15,13 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import touched
 from chamberopt.chamber.checks.place_names import PART, one_of
 from chamberopt.chamber.checks.warning import WarningKind
+from chamberopt.chamber.layout.arbor import Bore
+from chamberopt.chamber.layout.end import HeldEnd
+from chamberopt.chamber.layout.floor import Floor
+from chamberopt.chamber.layout.grip import thin_grip
+from chamberopt.chamber.layout.holder import end_holder, holder_choices
+from chamberopt.chamber.layout.sizes import LONG
+from chamberopt.chamber.layout.target import Target
 from chamberopt.chamber.propose.proposal import (
     HarmError,
     Proposal,
@@ -25,10 +32,6 @@ from chamberopt.chamber.propose.proposal import (
     touched_share,
     with_table,
 )
-from chamberopt.chamber.propose.proposed_arbor import Bore
-from chamberopt.chamber.propose.proposed_end import HeldEnd
-from chamberopt.chamber.propose.proposed_floor import Floor
-from chamberopt.chamber.propose.proposed_holder import end_holder, holder_choices, thin_grip
 from chamberopt.chamber.propose.proposed_mask import (
     are_holes,
     pads,
@@ -36,8 +39,6 @@ from chamberopt.chamber.propose.proposed_mask import (
     to_be_masked,
     to_be_plugged,
 )
-from chamberopt.chamber.propose.proposed_sizes import LONG
-from chamberopt.chamber.propose.proposed_target import Target
 from chamberopt.chamber.shop import Shop
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import Progress

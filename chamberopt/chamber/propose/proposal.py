@@ -12,12 +12,12 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import first_warnings, shot_reach, touched, warnings
 from chamberopt.chamber.checks.jams import JamGap, gaps_in_reach, jam_gaps
 from chamberopt.chamber.checks.warning import UNPEENED, DesignWarning, WarningKind
-from chamberopt.chamber.propose.pose import Pose, Turns
-from chamberopt.chamber.propose.proposed_balls import MOST_BALLS, SizeFit, charge_of
-from chamberopt.chamber.propose.proposed_end import HeldEnd, Strips
-from chamberopt.chamber.propose.proposed_floor import Floor
-from chamberopt.chamber.propose.proposed_sizes import Sizes
-from chamberopt.chamber.propose.proposed_target import Surface, Target
+from chamberopt.chamber.layout.balls import MOST_BALLS, SizeFit, charge_of
+from chamberopt.chamber.layout.end import HeldEnd, Strips
+from chamberopt.chamber.layout.floor import Floor
+from chamberopt.chamber.layout.pose import Pose, Turns
+from chamberopt.chamber.layout.sizes import Sizes
+from chamberopt.chamber.layout.target import Surface, Target
 from chamberopt.chamber.scene import MAX_BALLS, chamber_mesh
 from chamberopt.chamber.shop import Shop, ShopSonotrode
 from chamberopt.common.errors import InputError

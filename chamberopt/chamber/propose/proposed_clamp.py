@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from chamberopt.chamber.checks.place_names import CEILING, surface_names
+from chamberopt.chamber.layout.end import DEEP
+from chamberopt.chamber.layout.floor import Floor
+from chamberopt.chamber.layout.grip import Clamp, flat_jaws
+from chamberopt.chamber.layout.target import apart, area_in_mm2, named_or_all
 from chamberopt.chamber.propose.proposal import Proposal, checked, with_table
-from chamberopt.chamber.propose.proposed_end import DEEP
-from chamberopt.chamber.propose.proposed_floor import Floor
-from chamberopt.chamber.propose.proposed_mask import FLAT_DEG, rows_of
-from chamberopt.chamber.propose.proposed_target import (
-    apart,
-    area_in_mm2,
-    named_or_all,
-    nearest_axis,
-)
+from chamberopt.chamber.propose.proposed_mask import rows_of
 from chamberopt.chamber.shop import Shop
 from chamberopt.design.fixture import WIDEST_GAP, tight_gap_mm
-from chamberopt.geometry.faces import Faces
-from chamberopt.geometry.outline import convex_hull, fitted_circle, frame_along, narrowest_rectangle
+from chamberopt.geometry.outline import fitted_circle
 from chamberopt.geometry.solids import passes_opening
 from chamberopt.geometry.triangles import unit_normals
 
@@ -29,19 +23,9 @@ MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
 ROUNDING = 1e-9  # of a clearance over its step
 SEEN_OUT = 1e-3  # m by which a part stands out of a side
 MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area over the largest
-# Flat faces looked at for jaws; least area of each [m²]; of two, share of all that stands out, and
-# how far apart they are over the part's size: no vice takes a shaft by its ends.
-MOST_FLAT, LEAST_JAW, LEAST_OF_ALL, JAWS_OPEN = 20, 30e-6, 0.15, 0.8
 # Of a round face: how far its corners may be off a circle, over its radius, and the sum of its area
 # vectors over its area.
 OFF_ROUND, ALL_WAYS = 0.02, 0.2
-
-
-class Clamp(NamedTuple):
-    """What a part is clamped by outside of its chamber."""
-
-    text: str  # empty if nothing is named
-    is_shallow: bool = False  # true if jaws reach less deep than they need
 
 
 def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
@@ -188,64 +172,3 @@ def _is_round(corners: np.ndarray, outside: np.ndarray, axis: int) -> bool:
     is_outer = float(area @ (normal * aside).sum(axis=1)) > 0.0
     is_long = float(np.ptp(corners[own][..., axis])) >= DEEP
     return bool(off < OFF_ROUND * radius and is_even and is_outer and is_long)
-
-
-def flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) -> Clamp:
-    """Return the largest two flat faces, back to back, that stand out of a chamber.
-
-    The text is empty where there are none as large as jaws take.
-
-    Args:
-        vertices, triangles: the posed part [m].
-        outside: area of each triangle that may be clamped [m²], (m,).
-    """
-    faces = Faces(vertices, triangles, FLAT_DEG)
-    free = np.where(
-        faces.are_flat(FLAT_DEG), np.bincount(faces.of_triangle, outside, faces.count), 0.0
-    )
-    largest = np.argsort(-free, kind="stable")[:MOST_FLAT]
-    best, found = (False, LEAST_JAW), Clamp("")
-    longest = float(np.ptp(vertices, axis=0).max())
-    for k, one in enumerate(largest):
-        for other in largest[k + 1 :]:
-            pair = [int(one), int(other)]
-            area = float(min(free[one], free[other]))
-            ways = faces.normal(int(one)), faces.normal(int(other))
-            is_little = free[one] + free[other] < LEAST_OF_ALL * outside.sum()
-            is_small = is_little or area <= LEAST_JAW
-            if is_small or ways[0] @ ways[1] > -np.cos(np.radians(FLAT_DEG)):
-                continue
-            places = faces.place(int(one)), faces.place(int(other))
-            apart_by = ways[0] @ (places[0] - places[1])
-            if not 0.0 < apart_by < JAWS_OPEN * longest:  # the sides of a slot, or its far ends
-                continue
-            out = [vertices[triangles[(faces.of_triangle == k) & (outside > 0.0)]] for k in pair]
-            depth = min(_depth(*each) for each in zip(out, ways, free[pair], strict=True))
-            is_shallow = depth < DEEP
-            if (not is_shallow, area) <= best:
-                continue
-            best = not is_shallow, area
-            text = "jaws on its flat faces that look to " + " and ".join(
-                f"{nearest_axis(way)} ({area_in_mm2(float(free[face]))} of it)"
-                for way, face in zip(ways, pair, strict=True)
-            )
-            if is_shallow:
-                text += f"; SHALLOW GRIP, {1e3 * depth:.2g} mm of these faces: jaws need "
-                text += f"{1e3 * DEEP:g} mm"
-            found = Clamp(text, is_shallow)
-    return found
-
-
-def _depth(corners: np.ndarray, way: np.ndarray, area: float) -> float:
-    """Return how deep jaws reach over a piece of a flat face on the average [m].
-
-    Args:
-        corners: of its triangles, (k, 3, 3) [m].
-        way: normal of the face, (3,).
-        area: of the piece [m²].
-    """
-    hull = convex_hull(corners.reshape(-1, 3) @ frame_along(way)[:2].T)
-    if hull is None:
-        return 0.0
-    long, short = narrowest_rectangle(hull)[1]
-    return float(min(short, area / long))

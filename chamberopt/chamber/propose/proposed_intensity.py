@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from chamberopt.chamber.checks.usual import thickness_under_target
-from chamberopt.chamber.propose.proposal import BallTrial, Proposal, Wanted
-from chamberopt.chamber.propose.proposed_balls import (
+from chamberopt.chamber.layout.balls import (
     AS_GOOD,
     LARGEST_BALL,
     MANY,
@@ -22,6 +21,7 @@ from chamberopt.chamber.propose.proposed_balls import (
     fit_sizes,
     thinnest,
 )
+from chamberopt.chamber.propose.proposal import BallTrial, Proposal, Wanted
 from chamberopt.chamber.propose.proposed_budget import Measured
 from chamberopt.chamber.propose.proposed_setting import (
     AMPLITUDE_POWER,

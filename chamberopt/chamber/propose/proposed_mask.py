@@ -22,18 +22,13 @@ from chamberopt.chamber.checks.openings import (
     part_at_wall,
 )
 from chamberopt.chamber.checks.place_names import around
+from chamberopt.chamber.layout.arbor import Bore, find_bores
+from chamberopt.chamber.layout.end import Strips
+from chamberopt.chamber.layout.grip import FLAT_DEG
+from chamberopt.chamber.layout.pose import Turns
+from chamberopt.chamber.layout.target import RUNNING, Surface, apart, area_in_mm2, named_or_all
 from chamberopt.chamber.part import chosen_on_part, of_target
-from chamberopt.chamber.propose.pose import Turns
 from chamberopt.chamber.propose.proposal import Proposal, touched_share
-from chamberopt.chamber.propose.proposed_arbor import Bore, find_bores
-from chamberopt.chamber.propose.proposed_end import Strips
-from chamberopt.chamber.propose.proposed_target import (
-    RUNNING,
-    Surface,
-    apart,
-    area_in_mm2,
-    named_or_all,
-)
 from chamberopt.common.errors import InputError, one_line
 from chamberopt.design.design import Design
 from chamberopt.design.intensity import THIN_MM
@@ -50,7 +45,6 @@ from chamberopt.geometry.triangles import (
     unit_vectors,
 )
 
-FLAT_DEG = 1.0  # largest angle in a flat face
 STRAIGHT_UP = 0.9998  # cosine from which on a face is level: balls lie on it
 MOST_PADS = 8  # faces under one pad
 MOSTLY = 0.9  # share of an area that counts as all of it

@@ -21,14 +21,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from chamberopt.chamber.propose.proposal import Proposal, Wanted
-from chamberopt.chamber.propose.proposed_balls import (
+from chamberopt.chamber.layout.balls import (
     AS_GOOD,
     fit_sizes,
     mostly_serving,
     serving_sizes,
     sizes_to_try,
 )
+from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.shop import ShopSonotrode, usual_shop
 from chamberopt.design.intensity import WantedIntensity
 

@@ -17,6 +17,8 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import shot_reach
 from chamberopt.chamber.checks.jams import gaps_in_reach, jam_gaps
 from chamberopt.chamber.checks.warning import WarningKind
+from chamberopt.chamber.layout.balls import AS_GOOD, MANY, MISSED_FILLETS, MOSTLY, fit_sizes
+from chamberopt.chamber.layout.floor import of_blocks
 from chamberopt.chamber.propose.proposal import (
     Proposal,
     faults,
@@ -27,13 +29,6 @@ from chamberopt.chamber.propose.proposal import (
     touched_area,
     touched_share,
     warned_again,
-)
-from chamberopt.chamber.propose.proposed_balls import (
-    AS_GOOD,
-    MANY,
-    MISSED_FILLETS,
-    MOSTLY,
-    fit_sizes,
 )
 from chamberopt.chamber.propose.proposed_budget import (
     COVERED,
@@ -46,7 +41,6 @@ from chamberopt.chamber.propose.proposed_budget import (
     with_budget,
 )
 from chamberopt.chamber.propose.proposed_clamp import bore_clearance_mm
-from chamberopt.chamber.propose.proposed_floor import of_blocks
 from chamberopt.chamber.propose.proposed_intensity import LARGER
 from chamberopt.chamber.propose.proposed_mask import moved_openings
 from chamberopt.chamber.propose.proposed_setting import setting_of

@@ -18,12 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.layout.balls import MOST_BALLS
+from chamberopt.chamber.layout.floor import SEVERAL
+from chamberopt.chamber.layout.pose import AT_SIDE, Pose
 from chamberopt.chamber.propose.held_proposal import rests
-from chamberopt.chamber.propose.pose import AT_SIDE, Pose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, new_harm, with_charge
-from chamberopt.chamber.propose.proposed_balls import MOST_BALLS
 from chamberopt.chamber.propose.proposed_budget import LONG, Measured, TooSlowError
-from chamberopt.chamber.propose.proposed_floor import SEVERAL
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.triangles import rotation_matrix

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 import tomlkit
 
+from chamberopt.chamber.layout.balls import MANY, MISSED
+from chamberopt.chamber.layout.target import Surface
 from chamberopt.chamber.propose.proposal import Proposal
-from chamberopt.chamber.propose.proposed_balls import MANY, MISSED
 from chamberopt.chamber.propose.proposed_budget import LONG
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.proposed_mask import LeftOut
-from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.chamber.propose.quicker import HALF
 from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import AIMS

@@ -15,8 +15,8 @@ from chamberopt.cli.options import Json, Out, Verbose, app
 from chamberopt.common.errors import one_line
 
 if TYPE_CHECKING:
+    from chamberopt.chamber.layout.target import Surface
     from chamberopt.chamber.propose.proposal import Proposal
-    from chamberopt.chamber.propose.proposed_target import Surface
 
 PICK = "pick"  # in the place of names of surfaces
 

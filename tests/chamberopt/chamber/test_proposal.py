@@ -11,13 +11,13 @@ import trimesh
 from shapely import Polygon
 
 from chamberopt.chamber.checks.warning import WarningKind
+from chamberopt.chamber.layout.pose import pose_in_words
+from chamberopt.chamber.layout.sizes import Sizes
+from chamberopt.chamber.layout.target import Surface, propose_target, surfaces
 from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.first_design import _shot, propose
-from chamberopt.chamber.propose.pose import pose_in_words
 from chamberopt.chamber.propose.proposal import Wanted, propose_charge, propose_ranges
 from chamberopt.chamber.propose.proposed_mask import find_left_out
-from chamberopt.chamber.propose.proposed_sizes import Sizes
-from chamberopt.chamber.propose.proposed_target import Surface, propose_target, surfaces
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.chamber.shop import StockBalls, usual_shop
 from chamberopt.common.errors import InputError

@@ -7,13 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chamberopt.chamber.propose.proposed_floor import (
-    STEEPEST,
-    Floor,
-    floor_on_sonotrode,
-    require_room,
-)
-from chamberopt.chamber.propose.proposed_sizes import Sizes
+from chamberopt.chamber.layout.floor import STEEPEST, Floor, floor_on_sonotrode, require_room
+from chamberopt.chamber.layout.sizes import Sizes
 from chamberopt.chamber.shop import Shop, example_text, load_shop, usual_shop
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError

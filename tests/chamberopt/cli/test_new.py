@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import trimesh
 
+from chamberopt.chamber.layout.pose import hanging_pose, propose_pose, square_to_walls
+from chamberopt.chamber.layout.target import propose_target, surfaces
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.pose import hanging_pose, propose_pose, square_to_walls
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_budget import Measured
-from chamberopt.chamber.propose.proposed_target import propose_target, surfaces
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.design.intensity import PredictedIntensity

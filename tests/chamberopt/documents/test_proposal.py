@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 import trimesh
 
+from chamberopt.chamber.layout.balls import SizeFit
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import BallTrial, Proposal, Wanted
-from chamberopt.chamber.propose.proposed_balls import SizeFit
 from chamberopt.chamber.propose.proposed_mask import LeftOut
 from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.documents.proposal import (

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from chamberopt.chamber.propose.proposed_target import surfaces
+from chamberopt.chamber.layout.target import surfaces
 from chamberopt.cli import main
 from chamberopt.design.load import load_design
 from chamberopt.documents.facts import facts_in_words

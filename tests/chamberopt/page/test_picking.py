@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from chamberopt.chamber.layout.target import surfaces
 from chamberopt.chamber.part import chosen_triangles, posed_part, preview_part
-from chamberopt.chamber.propose.proposed_target import surfaces
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.design.part import Selection

@@ -11,6 +11,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import warnings
 from chamberopt.chamber.checks.place_names import PART, PART_SIDE
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
+from chamberopt.chamber.layout.target import Surface
 from chamberopt.chamber.propose import held_proposal
 from chamberopt.chamber.propose.held_proposal import _where_left
 from chamberopt.chamber.propose.proposal import (
@@ -20,7 +21,6 @@ from chamberopt.chamber.propose.proposal import (
     propose_tolerances,
     warned_again,
 )
-from chamberopt.chamber.propose.proposed_target import Surface
 from tests.helpers.synthetic import plate_design
 
 

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 import trimesh
 
+from chamberopt.chamber.layout.target import Surface
 from chamberopt.chamber.propose import proposed_clamp
 from chamberopt.chamber.propose.proposed_clamp import (
-    Clamp,
     _clamp,
     _is_cut_all_round,
     _is_round,
     bore_clearance_mm,
-    flat_jaws,
 )
-from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.design.fixture import tight_gap_mm
 
 
@@ -39,16 +37,6 @@ def test_what_is_buried_in_another_body_is_no_jaw(monkeypatch: pytest.MonkeyPatc
     )
     made = SimpleNamespace(design=None, chamber=chamber, known=known)
     assert _clamp(made).text == "SHAFT (500000 mm² of it)"  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(("deep", "is_shallow"), [(2.5, True), (6.0, True), (9.0, False)])
-def test_jaws_reach_deep_over_the_faces_that_they_close_on(deep: float, is_shallow: bool) -> None:
-    bar = trimesh.creation.box((60, 15, deep))
-    across = np.abs(bar.face_normals[:, 1]) > 0.9
-    jaws = flat_jaws(1e-3 * bar.vertices, bar.faces, np.where(across, 1e-6 * bar.area_faces, 0.0))
-    assert jaws.text.startswith("jaws on its flat faces that look to ")
-    assert jaws.is_shallow == is_shallow
-    assert (f"SHALLOW GRIP, {deep:g} mm" in jaws.text) == is_shallow
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -91,27 +79,6 @@ def test_a_part_that_goes_out_beside_each_other_is_cut_all_round(
     assert _is_cut_all_round(made) == is_cut  # type: ignore[arg-type]
     names[1] = "the part"  # it is the lid
     assert not _is_cut_all_round(made)  # type: ignore[arg-type]
-
-
-def test_jaws_close_on_flat_faces_back_to_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A channel: its flanges' inner faces look at each other, so that no jaws close on them."""
-    channel = trimesh.creation.box((60, 40, 30))
-    groove = trimesh.creation.box((70, 30, 30))
-    groove.apply_translation((0.0, 0.0, 5.0))
-    mesh = trimesh.boolean.difference([channel, groove])
-    area = mesh.area_faces * 1e-6
-    across = np.abs(mesh.face_normals[:, 1]) > 0.9
-    jaws = flat_jaws(1e-3 * mesh.vertices, mesh.faces, np.where(across, area, 0.0))
-    assert jaws.text.startswith("jaws on its flat faces that look to ")
-    assert {"+y (1800 mm² of it)", "-y (1800 mm² of it)"} == {
-        one.strip() for one in jaws.text.partition("look to ")[2].split(" and ")
-    }
-    inner = across & (np.abs(mesh.triangles_center[:, 1]) < 16.0)
-    assert flat_jaws(1e-3 * mesh.vertices, mesh.faces, np.where(inner, area, 0.0)) == Clamp("")
-    along = np.where(np.abs(mesh.face_normals[:, 0]) > 0.9, area, 0.0)
-    assert flat_jaws(1e-3 * mesh.vertices, mesh.faces, along) == Clamp("")  # its ends, 60 mm apart
-    ball = trimesh.creation.icosphere(3, radius=20.0)
-    assert flat_jaws(1e-3 * ball.vertices, ball.faces, 1e-6 * ball.area_faces) == Clamp("")
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 import trimesh
 
+from chamberopt.chamber.layout.balls import SizeFit, mostly_serving, serving_sizes
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
-from chamberopt.chamber.propose.proposed_balls import SizeFit, mostly_serving, serving_sizes
 from chamberopt.chamber.propose.proposed_budget import Asked, Measured, propose_budget
 from chamberopt.chamber.propose.proposed_intensity import (
     INTENSITY,

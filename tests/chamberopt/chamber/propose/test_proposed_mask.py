@@ -11,6 +11,7 @@ import trimesh
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.openings import Opening, find_walls_in_holes
+from chamberopt.chamber.layout.target import Surface, surfaces
 from chamberopt.chamber.propose import proposed_mask
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Wanted
@@ -23,7 +24,6 @@ from chamberopt.chamber.propose.proposed_mask import (
     pads,
     sharp_edges,
 )
-from chamberopt.chamber.propose.proposed_target import Surface, surfaces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
 

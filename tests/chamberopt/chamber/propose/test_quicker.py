@@ -12,10 +12,10 @@ import trimesh
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import warnings
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
+from chamberopt.chamber.layout.pose import Pose, end_to_wall, pose_by_size
 from chamberopt.chamber.propose import proposal
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.held_proposal import rests
-from chamberopt.chamber.propose.pose import Pose, end_to_wall, pose_by_size
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, with_charge
 from chamberopt.chamber.propose.proposed_budget import Measured, TooSlowError
 from chamberopt.chamber.propose.proposed_steps import NOT_OVER, propose_second_pose, turned_over

@@ -12,8 +12,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chamberopt.chamber.layout.target import surfaces
 from chamberopt.chamber.part import chosen_triangles, posed_part
-from chamberopt.chamber.propose.proposed_target import surfaces
 from chamberopt.common.errors import InputError
 from chamberopt.design.part import Selection
 from chamberopt.export.frame import frame_of

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from chamberopt.chamber.propose.proposed_sizes import LONG
+from chamberopt.chamber.layout.sizes import LONG
 from chamberopt.geometry.triangles import area_vectors, rotation_matrix, unit_vectors
 
 if TYPE_CHECKING:
-    from chamberopt.chamber.propose.proposed_target import Surface
+    from chamberopt.chamber.layout.target import Surface
     from chamberopt.geometry.meshes.part_mesh import PartMesh
 
 Turns = tuple[float, float, float]

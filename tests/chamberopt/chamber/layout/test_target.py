@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from manifold3d import CrossSection, Manifold
 
-from chamberopt.chamber.propose.proposed_sizes import Sizes, propose_sizes
-from chamberopt.chamber.propose.proposed_target import (
+from chamberopt.chamber.layout.sizes import Sizes, propose_sizes
+from chamberopt.chamber.layout.target import (
     BY_SHAPE,
     BY_SIZE,
     CREASE_DEG,
@@ -17,7 +17,7 @@ from chamberopt.chamber.propose.proposed_target import (
     propose_target,
     surfaces,
 )
-from tests.chamberopt.chamber.propose.test_proposed_arbor import drum, part_of
+from tests.chamberopt.chamber.layout.test_arbor import drum, part_of
 
 FLUTES = 1300
 

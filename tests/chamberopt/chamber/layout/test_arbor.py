@@ -9,16 +9,11 @@ import pytest
 import trimesh
 from manifold3d import Manifold, OpType
 
+from chamberopt.chamber.layout.arbor import arbor_through, find_bores, turning_bore, turning_pose
+from chamberopt.chamber.layout.holder import holder_choices
+from chamberopt.chamber.layout.target import Surface
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
-from chamberopt.chamber.propose.proposed_arbor import (
-    arbor_through,
-    find_bores,
-    turning_bore,
-    turning_pose,
-)
-from chamberopt.chamber.propose.proposed_holder import holder_choices
-from chamberopt.chamber.propose.proposed_target import Surface
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
 from chamberopt.geometry.triangles import rotation_matrix

@@ -7,10 +7,10 @@ import pytest
 import trimesh
 from shapely import Polygon
 
+from chamberopt.chamber.layout.balls import SizeFit, charge_of, fit_sizes, propose_ball
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Wanted, sonotrode_area
-from chamberopt.chamber.propose.proposed_balls import SizeFit, charge_of, fit_sizes, propose_ball
 from chamberopt.chamber.propose.proposed_intensity import with_thin_places
 from chamberopt.chamber.propose.text import clauses, to_settle
 from chamberopt.geometry.triangles import areas

@@ -8,22 +8,18 @@ import pytest
 import trimesh
 from manifold3d import CrossSection, Manifold, OpType
 
+from chamberopt.chamber.layout.end import bare_end, held_end
+from chamberopt.chamber.layout.holder import HolderChoice, end_holder, holder_choices
+from chamberopt.chamber.layout.target import WHOLE, Surface, Target, apart
 from chamberopt.chamber.propose import first_design
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.held_proposal import is_firm, is_held_thinly
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
-from chamberopt.chamber.propose.proposed_end import bare_end, held_end
-from chamberopt.chamber.propose.proposed_holder import (
-    HolderChoice,
-    end_holder,
-    holder_choices,
-    thin_grip,
-)
 from chamberopt.chamber.propose.proposed_mask import find_left_out
-from chamberopt.chamber.propose.proposed_target import WHOLE, Surface, Target, apart
 from chamberopt.chamber.propose.text import clauses, design_text
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
+from tests.chamberopt.chamber.layout.test_grip import blade_on_root, solid
 
 BALL = 1e-3
 
@@ -35,11 +31,6 @@ def choices_of(body: trimesh.Trimesh, target: np.ndarray) -> list[HolderChoice]:
     triangles = body.faces.astype(np.int32)
     mesh = PartMesh(1e-3 * body.vertices, triangles, number_by_position(count), (), "", {})
     return holder_choices(mesh, target, (0.0, 0.0, 0.0), BALL)
-
-
-def solid(made: Manifold) -> trimesh.Trimesh:
-    mesh = made.to_mesh()
-    return trimesh.Trimesh(mesh.vert_properties, mesh.tri_verts, process=False)
 
 
 def test_a_plate_is_held_by_a_rod_opposite_to_its_target() -> None:
@@ -323,37 +314,6 @@ def test_a_body_is_not_named_beside_its_faces() -> None:
     told = [(surface(name), float(one.sum()), one) for name, one in each.items()]
     assert [(one.name, size) for one, size in apart(told)] == [("FRONT", 4.0), ("REAR", 3.0)]
     assert apart([]) == []
-
-
-def blade_on_root(thick: float, long: float) -> trimesh.Trimesh:
-    """A blade, 30 mm wide, that stands along z on a block of 40 x 30 x 20 mm [mm]."""
-    root = Manifold.cube((40, 30, 20)).translate([-20, -15, -20])
-    return solid(root + Manifold.cube((30, thick, long)).translate([-15, -0.5 * thick, 0]))
-
-
-@pytest.mark.parametrize("larger", [1.0, 3.0])
-@pytest.mark.parametrize(
-    ("thick", "long", "axis", "is_thin"),
-    [
-        (2.0, 60.0, (0, 0, 1), True),
-        (3.0, 60.0, (0, 0, 1), True),
-        (12.0, 60.0, (0, 0, 1), False),  # of thick metal
-        (2.0, 20.0, (0, 0, 1), False),  # the centre of mass is near
-        (2.0, 60.0, (0, 0, -1), False),  # held by its root
-    ],
-)
-def test_a_blade_is_not_held_by_its_tip(
-    thick: float, long: float, axis: tuple[int, int, int], is_thin: bool, larger: float
-) -> None:
-    body = blade_on_root(thick, long)
-    grip = larger * 8e-3
-    found = thin_grip(1e-3 * larger * body.vertices, body.faces, np.array(axis, float), grip)
-    assert (found is not None) == is_thin
-    if found is not None:
-        middle = body.center_mass[2]
-        assert found.metal == pytest.approx(1e-3 * larger * thick, rel=0.1)
-        assert found.overhang == pytest.approx(1e-3 * larger * (long - 8.0 - middle), rel=1e-3)
-        assert "THIN GRIP" in clauses(found.text)[1][0]
 
 
 @pytest.mark.parametrize(("thick", "long"), [(2.0, 60.0), (3.0, 70.0)])

@@ -11,11 +11,7 @@ import trimesh
 from manifold3d import Manifold, Mesh
 
 from chamberopt.chamber.build import build_chamber
-from chamberopt.chamber.propose import proposed_mask
-from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.held_proposal import rests
-from chamberopt.chamber.propose.proposal import Wanted, nested
-from chamberopt.chamber.propose.proposed_end import (
+from chamberopt.chamber.layout.end import (
     Shape,
     bare_end,
     can_be_clamped,
@@ -26,20 +22,24 @@ from chamberopt.chamber.propose.proposed_end import (
     root_out,
     strip,
 )
+from chamberopt.chamber.layout.sizes import propose_sizes
+from chamberopt.chamber.layout.target import Surface, Target
+from chamberopt.chamber.propose import proposed_mask
+from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.held_proposal import rests
+from chamberopt.chamber.propose.proposal import Wanted, nested
 from chamberopt.chamber.propose.proposed_mask import (
     find_left_out,
     in_setting,
     rows_of,
     unlike_settings,
 )
-from chamberopt.chamber.propose.proposed_sizes import propose_sizes
-from chamberopt.chamber.propose.proposed_target import Surface, Target
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design, validate
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.triangles import areas
 from chamberopt.workflows.propose import _settings_beside
-from tests.chamberopt.chamber.propose.test_proposed_arbor import drum, part_of
+from tests.chamberopt.chamber.layout.test_arbor import drum, part_of
 from tests.helpers.eight_parts import EIGHT_PARTS
 
 UPRIGHT = (0.0, 0.0, 0.0)

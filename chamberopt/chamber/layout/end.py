@@ -23,9 +23,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.propose.pose import Turns, turns_down
-from chamberopt.chamber.propose.proposed_sizes import Sizes
-from chamberopt.chamber.propose.proposed_target import Target
+from chamberopt.chamber.layout.pose import Turns, turns_down
+from chamberopt.chamber.layout.sizes import Sizes
+from chamberopt.chamber.layout.target import Target
 from chamberopt.design.shapes.outlines import area_inside
 from chamberopt.geometry.cut import cut_at_box, facets
 from chamberopt.geometry.heights import lowest_over

@@ -23,8 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.propose.proposed_end import Strips
-from chamberopt.chamber.propose.proposed_sizes import Sizes
+from chamberopt.chamber.layout.end import Strips
+from chamberopt.chamber.layout.sizes import Sizes
 from chamberopt.chamber.shop import Shop, Stand
 from chamberopt.common.errors import InputError
 from chamberopt.design.fixture import slit_in_words

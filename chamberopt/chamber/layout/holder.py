@@ -22,11 +22,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.fixture import OF_FACE
-from chamberopt.chamber.propose.proposed_arbor import Bore, arbor_through, carries
-from chamberopt.chamber.propose.proposed_clamp import flat_jaws
-from chamberopt.chamber.propose.proposed_end import UPRIGHT, box_beyond
+from chamberopt.chamber.layout.arbor import Bore, arbor_through, carries
+from chamberopt.chamber.layout.end import UPRIGHT, box_beyond
+from chamberopt.chamber.layout.grip import FLAT_DEG, flat_jaws, gripped, thin_grip
 from chamberopt.common.number_text import plain
-from chamberopt.geometry.cut import cut_at_box, facets
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import (
     centroid,
@@ -37,16 +36,8 @@ from chamberopt.geometry.outline import (
     narrowest_rectangle,
     radii,
 )
-from chamberopt.geometry.thickness import depth_below
-from chamberopt.geometry.triangles import (
-    area_vectors,
-    areas,
-    centre_of_mass,
-    rotation_matrix,
-    unit_normals,
-)
+from chamberopt.geometry.triangles import area_vectors, areas, rotation_matrix
 
-FLAT_DEG = 1.0  # largest angle in a flat face: fillets beside it are no part of it
 ROUND_DEG = 25.0  # to the facets of a round beside one of them
 MOST_FACES = 40  # flat faces that are looked at, the largest
 UP, LEVEL = 0.98, -0.1  # upward component of the normal of a face on top, and of one at the side
@@ -64,10 +55,6 @@ POTTED = "NO STRAIGHT END TO CLAMP: give jaws its form, or cast it into the bloc
 # Thickness of a collar's or block's walls round an end: a share of its width, within [m], and where
 # there is no room for that, as thick as jaws with screws may be, and as a cap that is drilled.
 OF_WIDTH, THICKEST, WALLS = 0.25, 10e-3, (5e-3, 2e-3)
-# An end is too thin to hold a part by if half of the metal between the jaws is thinner than this,
-# [m] or over the part's least size, and the centre of mass lies further beyond them than so many
-# lengths of the grip. Metal is measured to so much [m]; sides of an end lean by less than a cosine.
-THIN_METAL, THIN_SHARE, FAR_OUT, THICK, SIDEWAYS = 4e-3, 0.15, 3.0, 20e-3, 0.7
 THINNEST, SLIM = 2e-3, 0.15  # of a rod: m, and over the part's width: slim ones come last
 # Over the radius of a face: least seat of a rod round a hole in it, and least edge beside a target.
 SEAT, EDGE = 0.05, 0.3
@@ -183,79 +170,17 @@ def holder_choices(
     return [one for _, one in sorted(found, key=lambda one: one[0])]
 
 
-class ThinGrip(NamedTuple):
-    """A grip on an end that is too thin for the part that stands out of it."""
-
-    metal: float  # thickness of half of the metal between the jaws at most [m]
-    overhang: float  # of the centre of mass beyond the jaws [m]
-
-    @property
-    def text(self) -> str:
-        """What is to be settled."""
-        return (
-            f"THIN GRIP, on {1e3 * self.metal:.2g} mm of metal, with the centre of mass "
-            f"{1e3 * self.overhang:.2g} mm beyond the jaws: hold the part by another end, or take "
-            "a target that leaves one free (--target)"
-        )
-
-
-class _Gripped(NamedTuple):
-    """An end between jaws, seen along the axis in which it points, divided where they end."""
-
-    vertices: np.ndarray  # of the whole part [m], (n, 3), the last coordinate along the axis
-    triangles: np.ndarray  # (m, 3)
-    sides: np.ndarray  # marks those of the end's sides between the jaws, (m,)
-    level: float  # place of the jaws' lower end [m]
-
-
-def _gripped(posed: np.ndarray, triangles: np.ndarray, axis: np.ndarray, grip: float) -> _Gripped:
-    """Return the end of a part that points along an axis, between jaws.
-
-    Args:
-        posed, triangles: the part in its pose, (n, 3) [m] and (m, 3).
-        axis: unit vector in the chamber's frame, (3,).
-        grip: length of the end between the jaws [m].
-    """
-    seen = posed @ frame_along(axis).T
-    low, high = seen.min(axis=0) - 1e-3, seen.max(axis=0) + 1e-3
-    level = float(seen[:, 2].max()) - grip
-    low[2] = level
-    beyond = seen[triangles][..., 2].max(axis=1) > level
-    cut = cut_at_box(facets(seen, triangles), np.array([low, high]), beyond)
-    corners = cut.vertices[cut.triangles]
-    inside = corners[..., 2].mean(axis=1) > level
-    aside = np.abs(unit_normals(corners)[:, 2]) < SIDEWAYS
-    return _Gripped(cut.vertices, cut.triangles, inside & aside, level)
-
-
-def thin_grip(
-    posed: np.ndarray, triangles: np.ndarray, axis: np.ndarray, grip: float
-) -> ThinGrip | None:
-    """Return how thin the end is that a holder grips, if it is too thin for the part; else None.
-
-    Args:
-        posed, triangles, axis, grip: those of _gripped.
-    """
-    beyond = float((posed @ axis).max()) - grip - float(centre_of_mass(posed, triangles) @ axis)
-    if beyond <= FAR_OUT * grip:
-        return None
-    end = _gripped(posed, triangles, axis, grip)
-    metal = depth_below(end.vertices, end.triangles, end.sides, 0.5, THICK)
-    least = max(THIN_METAL, THIN_SHARE * float(np.ptp(posed, axis=0).min()))
-    return ThinGrip(metal, beyond) if metal < least else None
-
-
 def _told(
     choice: HolderChoice, posed: np.ndarray, triangles: np.ndarray, axis: np.ndarray
 ) -> HolderChoice:
     """Return the choice of a holder round an end with what is said of its grip.
 
     Args:
-        posed, triangles, axis: those of _gripped.
+        posed, triangles, axis: those of gripped.
     """
     grip, words = 1e-3 * choice.keys["grip_mm"], [choice.reason]
     if choice.narrows:
-        end = _gripped(posed, triangles, axis, grip)
+        end = gripped(posed, triangles, axis, grip)
         area = np.where(end.sides, areas(end.vertices, end.triangles), 0.0)
         jaws = flat_jaws(end.vertices @ frame_along(axis), end.triangles, area)
         words.append(jaws.text if jaws.text and not jaws.is_shallow else POTTED)

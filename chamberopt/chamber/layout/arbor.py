@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.fixture import ACROSS
-from chamberopt.chamber.propose.pose import Turns, square_to_walls, turns_down
-from chamberopt.chamber.propose.proposed_target import CREASE_DEG
+from chamberopt.chamber.layout.pose import Turns, square_to_walls, turns_down
+from chamberopt.chamber.layout.target import CREASE_DEG
 from chamberopt.design.fixture import joint_in_words
 from chamberopt.geometry.face_shapes import is_hole
 from chamberopt.geometry.meshes.part_mesh import PartMesh

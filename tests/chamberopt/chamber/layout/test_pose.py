@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.propose.pose import pose_in_words, propose_pose
-from tests.chamberopt.chamber.propose.test_proposed_arbor import drum, part_of
+from chamberopt.chamber.layout.pose import pose_in_words, propose_pose
+from tests.chamberopt.chamber.layout.test_arbor import drum, part_of
 
 
 @pytest.mark.parametrize(

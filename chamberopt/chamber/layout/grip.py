@@ -1,0 +1,154 @@
+"""Tell by what an end of a part is gripped: flat faces that jaws close on, and its metal."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from chamberopt.chamber.layout.end import DEEP
+from chamberopt.chamber.layout.target import area_in_mm2, nearest_axis
+from chamberopt.geometry.cut import cut_at_box, facets
+from chamberopt.geometry.faces import Faces
+from chamberopt.geometry.outline import convex_hull, frame_along, narrowest_rectangle
+from chamberopt.geometry.thickness import depth_below
+from chamberopt.geometry.triangles import centre_of_mass, unit_normals
+
+FLAT_DEG = 1.0  # largest angle in a flat face: fillets beside it are no part of it
+# Flat faces looked at for jaws; least area of each [m²]; of two, share of all that stands out, and
+# how far apart they are over the part's size: no vice takes a shaft by its ends.
+MOST_FLAT, LEAST_JAW, LEAST_OF_ALL, JAWS_OPEN = 20, 30e-6, 0.15, 0.8
+# An end is too thin to hold a part by if half of the metal between the jaws is thinner than this,
+# [m] or over the part's least size, and the centre of mass lies further beyond them than so many
+# lengths of the grip. Metal is measured to so much [m]; sides of an end lean by less than a cosine.
+THIN_METAL, THIN_SHARE, FAR_OUT, THICK, SIDEWAYS = 4e-3, 0.15, 3.0, 20e-3, 0.7
+
+
+class Clamp(NamedTuple):
+    """What a part is clamped by outside of its chamber."""
+
+    text: str  # empty if nothing is named
+    is_shallow: bool = False  # true if jaws reach less deep than they need
+
+
+def flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) -> Clamp:
+    """Return the largest two flat faces, back to back, that stand out of a chamber.
+
+    The text is empty where there are none as large as jaws take.
+
+    Args:
+        vertices, triangles: the posed part [m].
+        outside: area of each triangle that may be clamped [m²], (m,).
+    """
+    faces = Faces(vertices, triangles, FLAT_DEG)
+    free = np.where(
+        faces.are_flat(FLAT_DEG), np.bincount(faces.of_triangle, outside, faces.count), 0.0
+    )
+    largest = np.argsort(-free, kind="stable")[:MOST_FLAT]
+    best, found = (False, LEAST_JAW), Clamp("")
+    longest = float(np.ptp(vertices, axis=0).max())
+    for k, one in enumerate(largest):
+        for other in largest[k + 1 :]:
+            pair = [int(one), int(other)]
+            area = float(min(free[one], free[other]))
+            ways = faces.normal(int(one)), faces.normal(int(other))
+            is_little = free[one] + free[other] < LEAST_OF_ALL * outside.sum()
+            is_small = is_little or area <= LEAST_JAW
+            if is_small or ways[0] @ ways[1] > -np.cos(np.radians(FLAT_DEG)):
+                continue
+            places = faces.place(int(one)), faces.place(int(other))
+            apart_by = ways[0] @ (places[0] - places[1])
+            if not 0.0 < apart_by < JAWS_OPEN * longest:  # the sides of a slot, or its far ends
+                continue
+            out = [vertices[triangles[(faces.of_triangle == k) & (outside > 0.0)]] for k in pair]
+            depth = min(_depth(*each) for each in zip(out, ways, free[pair], strict=True))
+            is_shallow = depth < DEEP
+            if (not is_shallow, area) <= best:
+                continue
+            best = not is_shallow, area
+            text = "jaws on its flat faces that look to " + " and ".join(
+                f"{nearest_axis(way)} ({area_in_mm2(float(free[face]))} of it)"
+                for way, face in zip(ways, pair, strict=True)
+            )
+            if is_shallow:
+                text += f"; SHALLOW GRIP, {1e3 * depth:.2g} mm of these faces: jaws need "
+                text += f"{1e3 * DEEP:g} mm"
+            found = Clamp(text, is_shallow)
+    return found
+
+
+def _depth(corners: np.ndarray, way: np.ndarray, area: float) -> float:
+    """Return how deep jaws reach over a piece of a flat face on the average [m].
+
+    Args:
+        corners: of its triangles, (k, 3, 3) [m].
+        way: normal of the face, (3,).
+        area: of the piece [m²].
+    """
+    hull = convex_hull(corners.reshape(-1, 3) @ frame_along(way)[:2].T)
+    if hull is None:
+        return 0.0
+    long, short = narrowest_rectangle(hull)[1]
+    return float(min(short, area / long))
+
+
+class ThinGrip(NamedTuple):
+    """A grip on an end that is too thin for the part that stands out of it."""
+
+    metal: float  # thickness of half of the metal between the jaws at most [m]
+    overhang: float  # of the centre of mass beyond the jaws [m]
+
+    @property
+    def text(self) -> str:
+        """What is to be settled."""
+        return (
+            f"THIN GRIP, on {1e3 * self.metal:.2g} mm of metal, with the centre of mass "
+            f"{1e3 * self.overhang:.2g} mm beyond the jaws: hold the part by another end, or take "
+            "a target that leaves one free (--target)"
+        )
+
+
+class Gripped(NamedTuple):
+    """An end between jaws, seen along the axis in which it points, divided where they end."""
+
+    vertices: np.ndarray  # of the whole part [m], (n, 3), the last coordinate along the axis
+    triangles: np.ndarray  # (m, 3)
+    sides: np.ndarray  # marks those of the end's sides between the jaws, (m,)
+    level: float  # place of the jaws' lower end [m]
+
+
+def gripped(posed: np.ndarray, triangles: np.ndarray, axis: np.ndarray, grip: float) -> Gripped:
+    """Return the end of a part that points along an axis, between jaws.
+
+    Args:
+        posed, triangles: the part in its pose, (n, 3) [m] and (m, 3).
+        axis: unit vector in the chamber's frame, (3,).
+        grip: length of the end between the jaws [m].
+    """
+    seen = posed @ frame_along(axis).T
+    low, high = seen.min(axis=0) - 1e-3, seen.max(axis=0) + 1e-3
+    level = float(seen[:, 2].max()) - grip
+    low[2] = level
+    beyond = seen[triangles][..., 2].max(axis=1) > level
+    cut = cut_at_box(facets(seen, triangles), np.array([low, high]), beyond)
+    corners = cut.vertices[cut.triangles]
+    inside = corners[..., 2].mean(axis=1) > level
+    aside = np.abs(unit_normals(corners)[:, 2]) < SIDEWAYS
+    return Gripped(cut.vertices, cut.triangles, inside & aside, level)
+
+
+def thin_grip(
+    posed: np.ndarray, triangles: np.ndarray, axis: np.ndarray, grip: float
+) -> ThinGrip | None:
+    """Return how thin the end is that a holder grips, if it is too thin for the part; else None.
+
+    Args:
+        posed, triangles, axis, grip: those of _gripped.
+    """
+    beyond = float((posed @ axis).max()) - grip - float(centre_of_mass(posed, triangles) @ axis)
+    if beyond <= FAR_OUT * grip:
+        return None
+    end = gripped(posed, triangles, axis, grip)
+    metal = depth_below(end.vertices, end.triangles, end.sides, 0.5, THICK)
+    least = max(THIN_METAL, THIN_SHARE * float(np.ptp(posed, axis=0).min()))
+    return ThinGrip(metal, beyond) if metal < least else None

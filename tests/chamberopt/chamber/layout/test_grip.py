@@ -1,0 +1,76 @@
+"""By what an end of a part is gripped: flat faces for jaws, and the thickness of its metal."""
+
+import numpy as np
+import pytest
+import trimesh
+from manifold3d import Manifold
+
+from chamberopt.chamber.layout.grip import Clamp, flat_jaws, thin_grip
+from chamberopt.chamber.propose.text import clauses
+
+
+@pytest.mark.parametrize(("deep", "is_shallow"), [(2.5, True), (6.0, True), (9.0, False)])
+def test_jaws_reach_deep_over_the_faces_that_they_close_on(deep: float, is_shallow: bool) -> None:
+    bar = trimesh.creation.box((60, 15, deep))
+    across = np.abs(bar.face_normals[:, 1]) > 0.9
+    jaws = flat_jaws(1e-3 * bar.vertices, bar.faces, np.where(across, 1e-6 * bar.area_faces, 0.0))
+    assert jaws.text.startswith("jaws on its flat faces that look to ")
+    assert jaws.is_shallow == is_shallow
+    assert (f"SHALLOW GRIP, {deep:g} mm" in jaws.text) == is_shallow
+
+
+def test_jaws_close_on_flat_faces_back_to_back() -> None:
+    """A channel: its flanges' inner faces look at each other, so that no jaws close on them."""
+    channel = trimesh.creation.box((60, 40, 30))
+    groove = trimesh.creation.box((70, 30, 30))
+    groove.apply_translation((0.0, 0.0, 5.0))
+    mesh = trimesh.boolean.difference([channel, groove])
+    area = mesh.area_faces * 1e-6
+    across = np.abs(mesh.face_normals[:, 1]) > 0.9
+    jaws = flat_jaws(1e-3 * mesh.vertices, mesh.faces, np.where(across, area, 0.0))
+    assert jaws.text.startswith("jaws on its flat faces that look to ")
+    assert {"+y (1800 mm² of it)", "-y (1800 mm² of it)"} == {
+        one.strip() for one in jaws.text.partition("look to ")[2].split(" and ")
+    }
+    inner = across & (np.abs(mesh.triangles_center[:, 1]) < 16.0)
+    assert flat_jaws(1e-3 * mesh.vertices, mesh.faces, np.where(inner, area, 0.0)) == Clamp("")
+    along = np.where(np.abs(mesh.face_normals[:, 0]) > 0.9, area, 0.0)
+    assert flat_jaws(1e-3 * mesh.vertices, mesh.faces, along) == Clamp("")  # its ends, 60 mm apart
+    ball = trimesh.creation.icosphere(3, radius=20.0)
+    assert flat_jaws(1e-3 * ball.vertices, ball.faces, 1e-6 * ball.area_faces) == Clamp("")
+
+
+def solid(made: Manifold) -> trimesh.Trimesh:
+    mesh = made.to_mesh()
+    return trimesh.Trimesh(mesh.vert_properties, mesh.tri_verts, process=False)
+
+
+def blade_on_root(thick: float, long: float) -> trimesh.Trimesh:
+    """A blade, 30 mm wide, that stands along z on a block of 40 x 30 x 20 mm [mm]."""
+    root = Manifold.cube((40, 30, 20)).translate([-20, -15, -20])
+    return solid(root + Manifold.cube((30, thick, long)).translate([-15, -0.5 * thick, 0]))
+
+
+@pytest.mark.parametrize("larger", [1.0, 3.0])
+@pytest.mark.parametrize(
+    ("thick", "long", "axis", "is_thin"),
+    [
+        (2.0, 60.0, (0, 0, 1), True),
+        (3.0, 60.0, (0, 0, 1), True),
+        (12.0, 60.0, (0, 0, 1), False),  # of thick metal
+        (2.0, 20.0, (0, 0, 1), False),  # the centre of mass is near
+        (2.0, 60.0, (0, 0, -1), False),  # held by its root
+    ],
+)
+def test_a_blade_is_not_held_by_its_tip(
+    thick: float, long: float, axis: tuple[int, int, int], is_thin: bool, larger: float
+) -> None:
+    body = blade_on_root(thick, long)
+    grip = larger * 8e-3
+    found = thin_grip(1e-3 * larger * body.vertices, body.faces, np.array(axis, float), grip)
+    assert (found is not None) == is_thin
+    if found is not None:
+        middle = body.center_mass[2]
+        assert found.metal == pytest.approx(1e-3 * larger * thick, rel=0.1)
+        assert found.overhang == pytest.approx(1e-3 * larger * (long - 8.0 - middle), rel=1e-3)
+        assert "THIN GRIP" in clauses(found.text)[1][0]
