@@ -17,37 +17,17 @@ from chamberopt.chamber.checks.place_names import PART_SIDES, SIDE_WALL
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.layout.arbor import RPM, Bore, find_bores, turning_bore, turning_pose
 from chamberopt.chamber.layout.balls import fit_sizes, propose_ball, sizes_to_try
-from chamberopt.chamber.layout.end import (
-    Shape,
-    bare_end,
-    can_be_clamped,
-    cut_shape,
-    held_end,
-    local_room,
-    root_out,
-    strip,
-)
-from chamberopt.chamber.layout.floor import (
-    OUTSIDE,
-    SEVERAL,
-    Floor,
-    clear_of_face,
-    floor_on_sonotrode,
-    of_blocks,
-    require_room,
-)
+from chamberopt.chamber.layout.end import Shape, bare_end, cut_shape, held_end, root_out, strip
+from chamberopt.chamber.layout.floor import SEVERAL, Floor
 from chamberopt.chamber.layout.pose import (
     AT_SIDE,
     Pose,
     Turns,
-    end_to_wall,
-    hanging_pose,
     pose_by_size,
     pose_in_words,
     propose_pose,
-    square_to_walls,
 )
-from chamberopt.chamber.layout.sizes import middle_in_plan, propose_sizes, shape_for
+from chamberopt.chamber.layout.shot_material import choose_shot, hardness_in_words
 from chamberopt.chamber.layout.target import (
     Surface,
     Target,
@@ -79,13 +59,22 @@ from chamberopt.chamber.propose.proposal import (
     touched_share,
 )
 from chamberopt.chamber.propose.proposed_clamp import clamped_outside, grips_poorly
-from chamberopt.chamber.shop import HARD, STEEL, Shop, usual_shop
+from chamberopt.chamber.propose.proposed_room import (
+    AMPLITUDE_UM,
+    AT_WALL,
+    can_be_mounted,
+    floor_reasons,
+    floor_tables,
+    hanging_turns,
+    place_room,
+    room_reason,
+)
+from chamberopt.chamber.shop import Shop, usual_shop
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import step
 from chamberopt.common.toml_fields import MAX_COORDINATE_MM
 from chamberopt.design.design import Design, validate
-from chamberopt.design.materials import CATALOGUE, USUAL, alloy, ball, balls
-from chamberopt.geometry.heights import lowest_over, points_up_to
+from chamberopt.design.materials import CATALOGUE, USUAL, alloy
 from chamberopt.geometry.meshes.part_mesh import PartMesh, keep_part, read_part_cached
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import BY_SIZE, METRES_PER
@@ -93,35 +82,11 @@ from chamberopt.geometry.triangles import rotation_matrix
 
 LEAST_TOUCHED = 0.02  # share of the target that balls which are wished for have to touch
 REACHES = 0.95  # of a part's length, from which on a target reaches both of its ends
-AT_WALL = 2.0  # ball diameters from the target to the wall through which its end goes out
-OVER_RIM = (0.0, 2.5e-3, 5e-3)  # m over the ceiling at which a clamp may begin, as over a flange
 ROUNDED = 0.5e-3  # m by which sizes are rounded up
 FEW = 2  # sonotrodes side by side that are better than a room of which the part is held badly
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
-AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
-CERAMIC = "zirconia"  # for metals on which steel leaves iron
-# Least hardness of steel balls over the part's. A part as hard as they are is dented less: in
-# pilots of a gear of 650 HB tungsten carbide left 9 times the dents.
-HARDER = 1.25
-HARDENED_HB = 280.0  # of steel: from here on it was hardened, to what its name does not tell
-# By metal of the part. Of aluminium: SAE AMS-S-13165, note 5 to table VI (design/intensity.py).
-IRON = {
-    "aluminium": "STEEL LEAVES IRON on aluminium: decontaminate (note 5 to table VI of SAE "
-    "AMS-S-13165), or ceramic balls, such as --shot zirconia",
-    "titanium": "STEEL LEAVES IRON on titanium: decontaminate, or ceramic balls, such as --shot "
-    "zirconia (no source read)",
-    "cobalt": "STEEL LEAVES IRON on cobalt, as of implants: decontaminate, or ceramic balls, "
-    "such as --shot zirconia (no source read)",
-}
-ON_STAINLESS = (
-    "STEEL LEAVES IRON on stainless steel, which rusts: passivate the part, or ceramic balls, such "
-    "as --shot zirconia (no source read)"
-)
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
-BETWEEN = "a plate that fits between the faces of the part, like the two walls beside them"
-CUT_OUT = "plates, cut out round it"
-OWN_WALL, OWN_LID = "the part itself is the wall", f"the part itself is the lid: {CUT_OUT}"
 START = "NOT MEASURED by a pilot, a start"
 FEWER = "so that a strip of it takes few sonotrodes"
 NOT_THIN = "so that it is held by an end of thicker metal"
@@ -146,7 +111,7 @@ def propose(path: Path, wanted: Wanted, choose: Chooser) -> Proposal:
     Raises:
         InputError: the part cannot be used, or no chamber can be built round it.
     """
-    _shot(wanted.shot, alloy(wanted.alloy or USUAL_PART).name, wanted.shop or usual_shop())
+    choose_shot(wanted.shot, alloy(wanted.alloy or USUAL_PART).name, wanted.shop or usual_shop())
     with step("reading the part"):
         mesh = _read(path, wanted.unit)
         known = surfaces(mesh)
@@ -302,7 +267,7 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
     """
     (path, wanted, mesh, known), (target, turns, pose_reason, end, is_local) = given, stance
     part_alloy, shop = alloy(wanted.alloy or USUAL_PART).name, wanted.shop or usual_shop()
-    shot, shot_reason = _shot(wanted.shot, part_alloy, shop)
+    shot, shot_reason = choose_shot(wanted.shot, part_alloy, shop)
     whole = target
     if end is not None:
         target, turns = end.target, end.turns
@@ -331,7 +296,9 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
     with step("choosing the balls"):
         diameter, ball_reason = _ball_diameter(tables, wanted, shop)
     tables["shot"]["diameter_mm"] = round(1e3 * diameter, 4)
-    if not (end or wanted.pose) and (hanging := _hanging(mesh, target, turns, diameter, wanted)):
+    if not (end or wanted.pose) and (
+        hanging := hanging_turns(mesh, target, turns, diameter, wanted)
+    ):
         turns, pose_reason = hanging, ON_END
     shape = cut_shape(mesh, target.triangles, target.keys.get("box_mm"))
     if end is not None and end.room_mm is not None:  # the room is round all of that
@@ -342,7 +309,7 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
     may_turn = wanted.may_turn and wanted.pose is None
     turning = turning_bore(bores, mesh, target.triangles) if may_turn else None
     is_whole = turning is None and (end is None or end.strips is None)
-    if is_whole and not _can_be_mounted(shape, turns, diameter, wanted, out):
+    if is_whole and not can_be_mounted(shape, turns, diameter, wanted, out):
         poses = {turns: pose_reason}
         for one in AT_SIDE if wanted.pose is None else ():
             pose = pose_by_size(mesh.vertices, mesh.triangles, whole.triangles, one)
@@ -361,7 +328,7 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
         "shot.diameter_mm": ball_reason,
         **({"shot.material": shot_reason} if shot_reason else {}),
         "materials.part": "how balls rebound from it (C0, v0) is computed: to be calibrated"
-        + _hardness_in_words(part_alloy, shot)
+        + hardness_in_words(part_alloy, shot)
         if wanted.alloy
         else "ALLOY NOT KNOWN, a guess: chamberopt materials lists alloys",
         "materials.wall": "hardened, as soft walls slow the balls; give yours",
@@ -392,19 +359,19 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
         for number, wider in enumerate(WIDER):
             progress(number, len(WIDER), None)
             try:
-                placed, floor = _place(shape, pose, diameter, form, wider, is_local, out)
+                placed, floor = place_room(shape, pose, diameter, form, wider, is_local, out)
                 floor = floor._replace(strips=end.strips if end is not None else None)
                 part = {**tables["part"], "rotate_deg": list(placed)}
                 if any(floor.offset_mm):
                     part["offset_mm"] = list(floor.offset_mm)
-                own = {**common, "part": part, **_floor_tables(floor)}
+                own = {**common, "part": part, **floor_tables(floor)}
                 words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {why_so}"}
                 if turning is not None:
                     words["part.rotate_deg"] = why_so
                     words["effects.part_turn"] = (
                         f"TURNED BY A DRIVE, at {RPM:g} rpm: its shaft is sealed in the wall"
                     )
-                why = {**reasons, **words, **_floor_reasons(floor, goes_out, diameter)}
+                why = {**reasons, **words, **floor_reasons(floor, goes_out, diameter)}
                 made = checked(own, why, floor, known, mesh, wanted.shop)
             except UnreadableError:
                 raise
@@ -462,7 +429,7 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
     left_out = end is not None and end.target is not whole
     made = replace(
         made,
-        reasons={**made.reasons, **_room_reason(made, floor)},
+        reasons={**made.reasons, **room_reason(made, floor)},
         leaves_end=left_out,
         stance=Stance(whole, turns, pose_reason, end, is_local),
     )
@@ -501,55 +468,6 @@ def _too_large(made: Proposal, stock_mm: Sequence[float]) -> str:
     remedy = f"give {largest[-1]:g} or smaller" if largest else "no size in stock does; --target"
     touches = f"but such balls touch {touched_share(made):.0%} of the target"
     return f"--ball-mm: given {given:g}, {touches}: {remedy}"
-
-
-def _shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
-    """Return the material of the balls, and why they are not of steel or what steel leaves behind.
-
-    Raises InputError if a wanted material is unknown, or its hardness and so its restitution is
-    not known.
-
-    Args:
-        name: the wanted material; if it is empty, steel, a harder one for a hard part, or a
-            ceramic where steel must leave no iron.
-        part: the part's alloy.
-    """
-    if name and ball(name).hardness_HB is None:
-        known = ", ".join(one.name for one in balls() if one.hardness_HB is not None)
-        text = "the hardness of these balls is not known, and their restitution follows from it"
-        raise InputError(f"--shot: given {name!r}; {text}; give one of {known}")
-    hardness = alloy(part).hardness_HB
-    metal, is_stainless = alloy(part).metal, alloy(part).stainless
-    spoiled = metal if metal in IRON else "stainless steel" if is_stainless else ""
-    if not name and spoiled and shop.has(CERAMIC):
-        return CERAMIC, f"steel leaves iron on {spoiled}"
-    if name or (ball(STEEL).hardness_HB or 0.0) >= HARDER * hardness or not shop.has(HARD):
-        found = ball(name or STEEL).name
-        on_steel = ON_STAINLESS if is_stainless else ""
-        return found, IRON.get(metal, on_steel) if found == STEEL else ""
-    return HARD, f"harder than the part, of {hardness:g} HB: balls of steel dent it less"
-
-
-def _hardness_in_words(part: str, shot: str) -> str:
-    """Return what is said of a hardness that decides the balls or the intensity; else nothing.
-
-    The name of a steel that is hardened does not tell in which state the part is.
-
-    Args:
-        part: the part's alloy.
-        shot: material of the balls.
-    """
-    metal = alloy(part)
-    if metal.metal != "steel" or metal.stainless or metal.hardness_HB < HARDENED_HB:
-        return ""
-    state = metal.condition.replace(";", ",").replace(f", {metal.hardness_HB:g} HB", "")
-    text = f"; HARDNESS ASSUMED, {metal.hardness_HB:g} HB ({state}): confirm it, as "
-    if shot == HARD:
-        return (
-            f"{text}it decides the balls: of steel they are no harder than the part, in use too, "
-            "and wear the sonotrode less (--shot steel)"
-        )
-    return f"{text}it decides which intensity is usual"
 
 
 def _read(path: Path, unit: str) -> PartMesh:
@@ -600,208 +518,3 @@ def _part_alone(tables: Tables) -> Part:
         "sonotrode": {"frequency_khz": 20.0, "amplitude_um": AMPLITUDE_UM},
     }
     return posed_part(validate(Design, nested({**tables, **alone})))[0]
-
-
-def _place(
-    part: Shape,
-    turns: Turns,
-    ball: float,
-    wanted: Wanted,
-    wider: float,
-    is_local: bool = False,
-    out: np.ndarray | None = None,
-) -> tuple[Turns, Floor]:
-    """Return the turns of a part [degrees] and the sizes of a chamber round it on a sonotrode.
-
-    The form of the chamber is the wanted one, else a cylinder where a sonotrode carries it. Else it
-    is that whose walls lean less, or the smaller one: a cylinder, or the form that suits the part.
-
-    Args:
-        turns: turns that bring the target down; the part may still be turned about z.
-        ball: diameter of the balls [m].
-        wider: factor on the room round the part.
-        is_local: true for a chamber round the target, whose walls the part goes out through.
-        out: axis of the part's file (3,) along which an end goes out through a wall, near which the
-            target ends.
-    Raises:
-        InputError: the shop has no sonotrode for it, or no chamber so large.
-    """
-    square, found = square_to_walls(part.vertices, turns), []
-    if out is not None:
-        square = end_to_wall(turns, out)
-    suits = shape_for(np.ptp(part.vertices @ rotation_matrix(square).T, axis=0))
-    refused: InputError | None = None
-    usual = ["box"] if is_local else ["cylinder", suits]
-    for shape in dict.fromkeys([wanted.shape] if wanted.shape else usual):
-        placed = square if shape == "box" else turns
-        posed = part.vertices @ rotation_matrix(placed).T
-        posed[:, 2] -= posed[:, 2].min()
-        on_target = posed[np.unique(part.triangles[part.target])]
-        top, around = float(on_target[:, 2].max()), on_target if is_local else None
-        sizes = propose_sizes(posed, top, ball, shape, wider, around, part.triangles)
-        shop = wanted.shop
-        out_at = sizes.height - sizes.distance
-        if (
-            sizes.through_ceiling
-            and not is_local
-            and not any(can_be_clamped(posed, part.triangles, 2, out_at + one) for one in OVER_RIM)
-        ):  # a higher ceiling takes in the whole part
-            sizes = propose_sizes(posed, float(posed[:, 2].max()), ball, shape, wider)
-        local = None
-        if is_local and shape == "box":
-            at_wall = None if out is None else AT_WALL * wider * ball
-            local = local_room(posed, part.triangles, part.target, sizes, at_wall)
-            sizes = local.sizes
-        try:
-            floor = floor_on_sonotrode(
-                sizes, _round(posed), shop or usual_shop(), shop is None, ball
-            )
-            lowest = 0.0
-            if local is not None:
-                lowest = lowest_over(posed, part.triangles, local.plan(floor.sizes))
-                floor = floor._replace(sizes=local.as_low_as(floor.sizes, lowest))
-                below = lowest - floor.sizes.distance
-                floor = clear_of_face(
-                    floor, posed, part.triangles, local.middle(floor.sizes), below
-                )
-            if shop is not None:
-                room, highest = require_room(floor.sizes, shop), float(posed[:, 2].max()) - lowest
-                if highest < room.height - room.distance:  # a higher lid takes in the whole part
-                    room = replace(room, through_ceiling=False, top=highest)
-                floor = floor._replace(sizes=room)
-            if is_local:
-                middle = middle_in_plan(on_target) if local is None else local.middle(floor.sizes)
-                x, y = np.round(1e3 * (middle_in_plan(posed) - middle), 2) + 0.0
-                floor = floor._replace(offset_mm=(float(x), float(y)))
-        except InputError as error:
-            refused = refused or error.with_traceback(None)
-            continue
-        found.append((placed, floor))
-    if refused and not found:
-        raise refused
-    return min(found, key=lambda one: one[1].excess)
-
-
-def _can_be_mounted(
-    part: Shape, turns: Turns, ball: float, wanted: Wanted, out: np.ndarray | None
-) -> bool:
-    """Return whether as many sonotrodes as a shop mounts carry a chamber for all of a target.
-
-    Args:
-        part, turns, ball, wanted, out: as of _place.
-    """
-    for is_local in {True, out is not None}:
-        with suppress(InputError):
-            _, floor = _place(part, turns, ball, wanted, 1.0, is_local, out)
-            if floor.face is not None and floor.stand.face.count <= SEVERAL:
-                return True
-    return False
-
-
-def _hanging(
-    mesh: PartMesh, target: Target, turns: Turns, ball: float, wanted: Wanted
-) -> Turns | None:
-    """Return turns with which the part hangs on end, if only then a sonotrode carries the chamber.
-
-    Args:
-        turns, ball, wanted: as of _place.
-    """
-
-    whole = Shape(mesh.vertices, mesh.triangles, target.triangles)
-
-    def is_carried(pose: Turns) -> bool:
-        try:
-            return _place(whole, pose, ball, wanted, 1.0)[1].is_one_sonotrode
-        except InputError:
-            return False
-
-    hanging = hanging_pose(*whole, turns)
-    needed = hanging is not None and not is_carried(turns) and is_carried(hanging)
-    return hanging if needed else None
-
-
-def _round(posed: np.ndarray) -> float:
-    """Return the radius [m] of the part about the middle of its box, seen from above."""
-    plan = posed[:, :2]
-    middle = 0.5 * (plan.min(axis=0) + plan.max(axis=0))
-    return float(np.linalg.norm(plan - middle, axis=1).max())
-
-
-def _floor_tables(floor: Floor) -> Tables:
-    """Return the tables of the design file that follow from the floor: chamber and sonotrode."""
-    sizes, one = floor.sizes, floor.stand.sonotrode
-    key, amplitude = one.amplitude_nearest(AMPLITUDE_UM)
-    sonotrode: dict[str, Any] = {"frequency_khz": one.frequency_khz, key: amplitude}
-    if floor.face is not None:
-        sonotrode["face"] = floor.face.model_dump(mode="json", exclude_defaults=True)
-    return {
-        "chamber": {
-            "shape": sizes.shape,
-            **sizes.plan,
-            "height_mm": round(1e3 * sizes.height, 3),
-            "sonotrode_distance_mm": round(1e3 * sizes.distance, 3),
-        },
-        "sonotrode": sonotrode,
-    }
-
-
-def _floor_reasons(floor: Floor, goes_out: bool, ball: float) -> dict[str, str]:
-    sizes, one = floor.sizes, floor.stand.sonotrode
-    where = "; the part goes out through it" if sizes.through_ceiling else ""
-    where = f"; {BETWEEN}" if sizes.is_fixed else where
-    where += "; " + OWN_LID if "z" in sizes.closed else ""
-    placed = "the target ends near the wall" if goes_out else "the target in the middle"
-    key, _ = one.amplitude_nearest(AMPLITUDE_UM)
-    kind = (
-        "zero-to-peak, half of" if key == "amplitude_um" else "peak-to-valley, twice zero-to-peak"
-    )
-    kind += " peak-to-valley" if key == "amplitude_um" else ""
-    return {
-        "chamber.height_mm": f"sonotrode to ceiling{where}",
-        "chamber.sonotrode_distance_mm": "mean sonotrode face to the part's lowest point in it"
-        + (f", so far that {OUTSIDE}" if floor.is_raised else ""),
-        **({"sonotrode.frequency_khz": one.note} if one.note else {}),
-        **({"sonotrode.face": of_blocks(ball)} if floor.stand.face.count > 1 else {}),
-        **({"part.offset_mm": placed} if any(floor.offset_mm) else {}),
-        f"sonotrode.{key}": f"{kind}; one to which the sonotrode can be set",
-    }
-
-
-def _room_reason(made: Proposal, floor: Floor) -> dict[str, str]:
-    """Return the reason for a chamber's first size in plan, by its dotted name.
-
-    It tells how far the walls are from the part, or from the target where the part goes out.
-    """
-    sizes = floor.sizes
-    first = next(key for key in sizes.plan if key.endswith("_mm"))
-    room = f"leaves at least {1e3 * sizes.gap:.3g} mm beside the part"
-    if sizes.shape == "box" and not floor.lean:
-        room = f"leaves {_room_in_box(made)}"
-    if sides := [one for one in sizes.closed if one != "z"]:
-        room += f"; {OWN_WALL} at {' and '.join(sides)}: {CUT_OUT}"
-    return {f"chamber.{first}": f"{room}; {floor.reason}"}
-
-
-def _room_in_box(made: Proposal) -> str:
-    """Return in words how far each wall of an upright box is from the part, or from the target.
-
-    What of the part is above the ceiling does not count.
-    """
-    part, chamber = made.chamber.part, made.tables["chamber"]
-    below = points_up_to(part.vertices, part.triangles, 1e-3 * chamber["height_mm"])
-    on_target = part.vertices[part.triangles[part.target]].reshape(-1, 3)
-    beside, before = [], []
-    for k, (name, key) in enumerate((("x", "length_mm"), ("y", "width_mm"))):
-        for side, sign in (("-", -1.0), ("+", 1.0)):
-            whole, target = (
-                0.5 * float(chamber[key]) - 1e3 * float((sign * one[:, k]).max())
-                for one in (below, on_target)
-            )
-            if whole > 0.0:
-                beside.append(f"{whole:.3g} mm at {side}{name}")
-            else:
-                before.append(f"{max(target, 0.0):.3g} mm at {side}{name}")
-    words = [f"{', '.join(beside)} beside the part"] if beside else []
-    if before:
-        words.append(f"{', '.join(before)} beside the target, where the part goes out")
-    return " and ".join(words)

@@ -12,10 +12,11 @@ from shapely import Polygon
 
 from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.layout.pose import pose_in_words
+from chamberopt.chamber.layout.shot_material import choose_shot
 from chamberopt.chamber.layout.sizes import Sizes
 from chamberopt.chamber.layout.target import Surface, propose_target, surfaces
 from chamberopt.chamber.part import chosen_triangles
-from chamberopt.chamber.propose.first_design import _shot, propose
+from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Wanted, propose_charge, propose_ranges
 from chamberopt.chamber.propose.proposed_mask import find_left_out
 from chamberopt.chamber.propose.text import design_text
@@ -206,7 +207,7 @@ def test_a_pose_is_said_as_a_fixture_gives_it(
 )
 def test_balls_are_harder_than_the_part(wanted: str, part: str, stock: str, material: str) -> None:
     own = (StockBalls(material=stock, diameters_mm=(1.0,)),) if stock else ()
-    found, reason = _shot(wanted, part, usual_shop().model_copy(update={"balls": own}))
+    found, reason = choose_shot(wanted, part, usual_shop().model_copy(update={"balls": own}))
     assert found == material
     assert ("LEAVES IRON" in reason) is (part == "7075-T6" and material == "steel")
     assert bool(reason) is ("LEAVES IRON" in reason or (not wanted and material != "steel"))
@@ -214,8 +215,8 @@ def test_balls_are_harder_than_the_part(wanted: str, part: str, stock: str, mate
 
 @pytest.mark.parametrize("part", ["7075-T6", "Ti-6Al-4V ELI", "17-4PH", "CoCrMo"])
 def test_steel_balls_leave_iron_on_what_rusts_or_is_implanted(part: str) -> None:
-    assert "LEAVES IRON" in _shot("steel", part, usual_shop())[1]
-    assert not _shot("zirconia", part, usual_shop())[1]
+    assert "LEAVES IRON" in choose_shot("steel", part, usual_shop())[1]
+    assert not choose_shot("zirconia", part, usual_shop())[1]
 
 
 def test_what_faces_away_is_offered_for_leaving_out(

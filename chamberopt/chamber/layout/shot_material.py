@@ -1,0 +1,75 @@
+"""Choose of what material the balls are, by the metal of the part and its hardness."""
+
+from __future__ import annotations
+
+from chamberopt.chamber.shop import HARD, STEEL, Shop
+from chamberopt.common.errors import InputError
+from chamberopt.design.materials import alloy, ball, balls
+
+CERAMIC = "zirconia"  # for metals on which steel leaves iron
+# Least hardness of steel balls over the part's. A part as hard as they are is dented less: in
+# pilots of a gear of 650 HB tungsten carbide left 9 times the dents.
+HARDER = 1.25
+HARDENED_HB = 280.0  # of steel: from here on it was hardened, to what its name does not tell
+# By metal of the part. Of aluminium: SAE AMS-S-13165, note 5 to table VI (design/intensity.py).
+IRON = {
+    "aluminium": "STEEL LEAVES IRON on aluminium: decontaminate (note 5 to table VI of SAE "
+    "AMS-S-13165), or ceramic balls, such as --shot zirconia",
+    "titanium": "STEEL LEAVES IRON on titanium: decontaminate, or ceramic balls, such as --shot "
+    "zirconia (no source read)",
+    "cobalt": "STEEL LEAVES IRON on cobalt, as of implants: decontaminate, or ceramic balls, "
+    "such as --shot zirconia (no source read)",
+}
+ON_STAINLESS = (
+    "STEEL LEAVES IRON on stainless steel, which rusts: passivate the part, or ceramic balls, such "
+    "as --shot zirconia (no source read)"
+)
+
+
+def choose_shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
+    """Return the material of the balls, and why they are not of steel or what steel leaves behind.
+
+    Raises InputError if a wanted material is unknown, or its hardness and so its restitution is
+    not known.
+
+    Args:
+        name: the wanted material; if it is empty, steel, a harder one for a hard part, or a
+            ceramic where steel must leave no iron.
+        part: the part's alloy.
+    """
+    if name and ball(name).hardness_HB is None:
+        known = ", ".join(one.name for one in balls() if one.hardness_HB is not None)
+        text = "the hardness of these balls is not known, and their restitution follows from it"
+        raise InputError(f"--shot: given {name!r}; {text}; give one of {known}")
+    hardness = alloy(part).hardness_HB
+    metal, is_stainless = alloy(part).metal, alloy(part).stainless
+    spoiled = metal if metal in IRON else "stainless steel" if is_stainless else ""
+    if not name and spoiled and shop.has(CERAMIC):
+        return CERAMIC, f"steel leaves iron on {spoiled}"
+    if name or (ball(STEEL).hardness_HB or 0.0) >= HARDER * hardness or not shop.has(HARD):
+        found = ball(name or STEEL).name
+        on_steel = ON_STAINLESS if is_stainless else ""
+        return found, IRON.get(metal, on_steel) if found == STEEL else ""
+    return HARD, f"harder than the part, of {hardness:g} HB: balls of steel dent it less"
+
+
+def hardness_in_words(part: str, shot: str) -> str:
+    """Return what is said of a hardness that decides the balls or the intensity; else nothing.
+
+    The name of a steel that is hardened does not tell in which state the part is.
+
+    Args:
+        part: the part's alloy.
+        shot: material of the balls.
+    """
+    metal = alloy(part)
+    if metal.metal != "steel" or metal.stainless or metal.hardness_HB < HARDENED_HB:
+        return ""
+    state = metal.condition.replace(";", ",").replace(f", {metal.hardness_HB:g} HB", "")
+    text = f"; HARDNESS ASSUMED, {metal.hardness_HB:g} HB ({state}): confirm it, as "
+    if shot == HARD:
+        return (
+            f"{text}it decides the balls: of steel they are no harder than the part, in use too, "
+            "and wear the sonotrode less (--shot steel)"
+        )
+    return f"{text}it decides which intensity is usual"
