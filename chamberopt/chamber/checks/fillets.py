@@ -123,6 +123,9 @@ class InnerEdges(NamedTuple):
     length: np.ndarray  # [m], (e,)
     radius: np.ndarray  # of the fillet there [m], (e,); 0 at an edge without a fillet
     triangles: np.ndarray  # on both sides, (e, 2)
+    # Whether each of these lies in the fillet, (e, 2): one beside it may be a whole flat face. Both
+    # do where the surface behind the triangles is not known.
+    in_fillet: np.ndarray
 
 
 def inner_edges(
@@ -175,7 +178,11 @@ def inner_edges(
         radius[known] = 1.0 / np.maximum(curvature[known], 1e-9)
     radius[turn > np.radians(SHARP)] = 0.0
     beside = np.c_[triangle[one], triangle[two]][inner]
-    return InnerEdges(ends.mean(axis=1)[inner], length[inner], radius, beside)
+    in_fillet = np.ones(beside.shape, dtype=bool)
+    if hollow is not None:
+        is_hollow = hollow[beside] > 0.0
+        in_fillet = is_hollow | ~is_hollow.any(axis=1, keepdims=True)
+    return InnerEdges(ends.mean(axis=1)[inner], length[inner], radius, beside, in_fillet)
 
 
 def too_narrow(edges: InnerEdges, area: np.ndarray, ball: float) -> np.ndarray:
@@ -226,7 +233,7 @@ def _turn_across(ends: np.ndarray, way: np.ndarray, turns: np.ndarray) -> np.nda
 def _fillets(chamber: Chamber, chosen: np.ndarray, largest: float) -> list[DesignWarning]:
     part = chamber.part
     edges = inner_edges(part.vertices, part.triangles, chosen, part.hollow)
-    middle, length, radius, _ = edges
+    middle, length, radius, *_ = edges
     small = too_narrow(edges, part.area, largest)
     if length[small].sum() < largest:  # a fillet is longer than a ball
         return []

@@ -118,7 +118,8 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
     edges = inner_edges(part.vertices, part.triangles, part.target, part.hollow)
     fillet = np.full(len(size), np.inf)  # radius of the smallest fillet at each triangle
     round_ = edges.radius > 0.0
-    np.minimum.at(fillet, edges.triangles[round_].ravel(), np.repeat(edges.radius[round_], 2))
+    edge, side = np.nonzero(edges.in_fillet & round_[:, None])
+    np.minimum.at(fillet, edges.triangles[edge, side], edges.radius[edge])
     on, whole = part.target[triangle], float(area[part.target[triangle]].sum())
     narrow = on & (fillet[triangle] < 0.5 * max(diameters))
     of_narrow = float(area[narrow].sum())

@@ -69,7 +69,8 @@ def hardness_in_words(part: str, shot: str) -> str:
     text = f"; HARDNESS ASSUMED, {metal.hardness_HB:g} HB ({state}): confirm it, as "
     if shot == HARD:
         return (
-            f"{text}it decides the balls: of steel they are no harder than the part, in use too, "
-            "and wear the sonotrode less (--shot steel)"
+            f"{text}it decides the balls: of steel, {ball(STEEL).hardness_HB:g} HB, they are "
+            "hardly harder than the part and dent it less, but wear the sonotrode less (--shot "
+            "steel)"
         )
     return f"{text}it decides which intensity is usual"

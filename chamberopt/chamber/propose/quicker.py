@@ -114,7 +114,8 @@ def _longest(made: Proposal, best: Way) -> float:
     """Return the time to 98 % [s] of a setting from which on a way is not taken instead of one."""
     if best.found is None:
         return math.inf
-    return QUICKER * best.found.time_to_98 * best.made.settings / made.settings
+    share = QUICKER if made.sonotrode_count >= best.made.sonotrode_count else 1.0
+    return share * best.found.time_to_98 * best.made.settings / made.settings
 
 
 def _is_slow(way: Way) -> bool:
@@ -151,7 +152,8 @@ def _objection(one: Way, found: Measured, other: Way, of_other: Measured) -> str
 
     What counts is the time of all settings in which the target is peened.
     A way on twice as many sonotrodes, which have to vibrate alike, has to take half of the time. Up
-    to SEVERAL do if it takes half of a time that nobody would run.
+    to SEVERAL do if it takes half of a time that nobody would run. One on fewer has to take no
+    longer.
 
     Args:
         found, of_other: what pilots measured of them.
@@ -168,10 +170,10 @@ def _objection(one: Way, found: Measured, other: Way, of_other: Measured) -> str
         and time < HALF * other_time
     ):
         return ""
-    ratio = max(one.made.sonotrode_count / other.made.sonotrode_count, 1.0)
-    if ratio * time < QUICKER * other_time:
+    ratio = one.made.sonotrode_count / other.made.sonotrode_count
+    if ratio * time < QUICKER * other_time and (ratio >= 1.0 or time <= other_time):
         return ""
-    return "hardly quicker" if ratio == 1.0 else "not quick enough for more sonotrodes"
+    return "hardly quicker" if ratio <= 1.0 else "not quick enough for more sonotrodes"
 
 
 def _said(found: Measured | None) -> str:

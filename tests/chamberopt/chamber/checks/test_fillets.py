@@ -25,7 +25,7 @@ def test_the_radius_of_a_bore_follows_from_its_facets() -> None:
     """Facets between points of a circle of 5 mm touch one of 5 mm times cos(pi / SIDES)."""
     ring = trimesh.creation.annulus(r_min=5e-3, r_max=9e-3, height=4e-3, sections=SIDES)
     every = np.ones(len(ring.faces), dtype=bool)
-    _, length, radius, _ = inner_edges(ring.vertices, ring.faces, every)
+    _, length, radius, *_ = inner_edges(ring.vertices, ring.faces, every)
     assert len(radius) == SIDES
     assert length == pytest.approx(4e-3)
     assert radius == pytest.approx(5e-3 * np.cos(np.pi / SIDES))
@@ -105,7 +105,9 @@ def test_a_curl_at_the_end_of_a_fillet_does_not_count(
     """An edge with a radius of 0.5 mm beside others of some mm, for balls of 0.8 mm."""
     radius = 1e-3 * larger * np.array([0.5, others])
     area = 1e-6 * larger**2 * np.array([0.5 * curl_mm2, 0.5 * curl_mm2, 109.0, 108.0])
-    edges = InnerEdges(np.zeros((2, 3)), np.ones(2), radius, np.arange(4).reshape(2, 2))
+    edges = InnerEdges(
+        np.zeros((2, 3)), np.ones(2), radius, np.arange(4).reshape(2, 2), np.ones((2, 2), bool)
+    )
     small = too_narrow(edges, area, 0.8e-3 * larger)
     assert small.tolist() == [counts, others == 0.0]
     # An inner edge without a fillet always counts.

@@ -1,5 +1,6 @@
 """Balls that `new` proposes: by fillets, slots, and gaps in which they would jam."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,25 @@ def test_a_ball_touches_what_its_radius_lets_it() -> None:
     assert [one.touched for one in fits] == pytest.approx([0.9, 0.81, 0.0], abs=0.01)
     # Four balls do not fit across; beside the corner it is the slot's bottom that is in the way.
     assert max(one.served for one in fits) < 0.15
+
+
+@pytest.mark.parametrize("long_mm", [30.0, 90.0])
+def test_flat_faces_beside_a_fillet_are_no_part_of_it(long_mm: float) -> None:
+    """Two legs with a fillet of 1 mm, of two triangles each, which balls of 2 mm serve."""
+    turns = np.radians(np.linspace(0.0, 90.0, 16))
+    arc = 1.0 - np.c_[np.sin(turns), np.cos(turns)] + 2.0
+    legs = trimesh.creation.extrude_polygon(
+        Polygon([(0, 0), (long_mm, 0), (long_mm, 2), *arc, (2, long_mm), (0, long_mm)]), 20
+    )
+    legs.apply_scale(1e-3)
+    middle, normal = 1e3 * legs.triangles_center, legs.face_normals
+    inner = (middle[:, :2] > 2.0 - 1e-6).all(axis=1) & (np.abs(normal[:, 2]) < 0.5)
+    inner &= (normal[:, :2] > -1e-6).all(axis=1) & (middle[:, :2].max(axis=1) < long_mm - 0.1)
+    in_arc = inner & (middle[:, :2] < 3.01).all(axis=1)
+    hollow = np.where(in_arc, 1e3, 0.0).astype(np.float32)
+    (fit,) = fit_sizes(replace(part_of(legs, inner), hollow=hollow), (2e-3,))
+    share = 1.0 - legs.area_faces[in_arc].sum() / legs.area_faces[inner].sum()
+    assert fit.served == pytest.approx(share, abs=0.02)
 
 
 @pytest.mark.parametrize(("radius_mm", "serves"), [(4.0, True), (3.8, False)])

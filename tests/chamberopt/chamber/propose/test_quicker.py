@@ -175,6 +175,18 @@ def test_more_sonotrodes_must_save_more_time(poses: dict[Pose | None, Proposal])
         assert told is (taken is None)
 
 
+def test_fewer_sonotrodes_are_taken_where_they_take_no_longer(
+    poses: dict[Pose | None, Proposal],
+) -> None:
+    first = Way(poses["on-edge"], Wanted("mm"), measured(1000.0))
+    for time, taken in ((1010.0, False), (990.0, True)):
+        pilot = measured(time)
+        best = propose_quicker(
+            first, lambda many: [poses[None] for _ in many], turned_over, lambda *_, x=pilot: x
+        )
+        assert (best.made.sonotrode_count == 1) is taken
+
+
 def test_a_time_that_nobody_would_run_is_worth_some_sonotrodes(
     poses: dict[Pose | None, Proposal],
 ) -> None:
