@@ -33,6 +33,10 @@ MAX_TRIANGLES = 400_000  # a part with more triangles keeps them undivided
 Values = Callable[[Places], np.ndarray]
 """Coverage at some places, (p,); NaN where there is none."""
 
+# Angle between the normals of two corners of one face at one vertex, from which on a sharp edge is
+# between them, and how many sides of such edges at one vertex are told apart.
+SHARP_DEG, SIDES = 15.0, 4
+
 
 @dataclass(frozen=True)
 class DisplayMesh:
@@ -144,19 +148,40 @@ def _with_vertices_of_faces(
 ) -> tuple[DisplayMesh, np.ndarray]:
     """Return the part as a mesh with separate vertices for each smooth face, and the index of the
     part's vertex behind each vertex.
+
+    A face that is smooth at one place may meet itself at a sharp edge elsewhere. There too it has
+    separate vertices: at a mean normal no ball would fit.
     """
-    faces = int(face.max()) + 1
-    own, corner = np.unique(triangles * np.int64(faces) + face[:, None], return_inverse=True)
-    corner = corner.reshape(-1, 3)
-    vertex, face_of = np.divmod(own, faces)
-    area = areas(vertices, triangles)
+    faces, corners = int(face.max()) + 1, normals.reshape(-1, 3)
+    places = (triangles * np.int64(faces) + face[:, None]).ravel()
+    own, corner = np.unique(places * SIDES + _side(places, corners), return_inverse=True)
+    vertex, face_of = np.divmod(own // SIDES, faces)
+    area = np.repeat(areas(vertices, triangles), 3)
     normal = np.zeros((len(own), 3))
-    for k in range(3):  # weighted by area, so a plane beside a rounded edge stays flat
-        np.add.at(normal, corner[:, k], area[:, None] * normals[:, k])
+    # weighted by area, so a plane beside a rounded edge stays flat
+    np.add.at(normal, corner, area[:, None] * corners)
     part_triangle = np.arange(len(triangles))
     return DisplayMesh(
-        vertices[vertex], corner, unit_vectors(normal), face_of, part_triangle
+        vertices[vertex], corner.reshape(-1, 3), unit_vectors(normal), face_of, part_triangle
     ), vertex
+
+
+def _side(places: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return on which side of a sharp edge corners of triangles lie, (k,), 0 where there is none.
+
+    Args:
+        places: number of each corner's vertex and face, (k,).
+        normals: of the surface at each corner, (k, 3).
+    """
+    side, left = np.zeros(len(places), dtype=np.int64), np.arange(len(places))
+    for number in range(SIDES):
+        side[left] = number
+        _, first, of_left = np.unique(places[left], return_index=True, return_inverse=True)
+        alike = np.einsum("ij,ij->i", normals[left], normals[left[first]][of_left])
+        left = left[alike < np.cos(np.radians(SHARP_DEG))]
+        if not len(left):
+            break
+    return side
 
 
 def _edges_of(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

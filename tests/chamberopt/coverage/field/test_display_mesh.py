@@ -16,17 +16,19 @@ GAUGE = 1e-6  # m²
 DIAMETER = 2.0 * np.sqrt(GAUGE / np.pi)
 
 
-def cube_mesh(coverage: Callable[[Places], np.ndarray], shown: int = 12) -> DisplayMesh:
+def cube_mesh(
+    coverage: Callable[[Places], np.ndarray], shown: int = 12, one_face: bool = False
+) -> DisplayMesh:
     """The display mesh of a cube, of which the field is drawn on the first triangles only."""
-    return mesh_and_numbers(coverage, shown)[0]
+    return mesh_and_numbers(coverage, shown, one_face)[0]
 
 
 def mesh_and_numbers(
-    coverage: Callable[[Places], np.ndarray], shown: int = 12
+    coverage: Callable[[Places], np.ndarray], shown: int = 12, one_face: bool = False
 ) -> tuple[DisplayMesh, np.ndarray]:
     cube = box([SIDE] * 3)
     drawn = np.arange(12) < shown
-    face = find_faces(cube.vertices, cube.faces, drawn)[0].of_triangle
+    face = find_faces(cube.vertices, cube.faces, drawn)[0].of_triangle * (not one_face)
     normals = np.repeat(cube.face_normals[:, None], 3, axis=1)
     return display_mesh.display_mesh(
         np.asarray(cube.vertices), np.asarray(cube.faces), normals, drawn, face, GAUGE, coverage
@@ -99,8 +101,10 @@ def test_places_without_a_value_are_told_from_all_others() -> None:
     assert len(cube_mesh(only_half).triangles) > 2 * len(cube_mesh(even).triangles)
 
 
-def test_a_vertex_belongs_to_one_face() -> None:
-    mesh = cube_mesh(even)
+@pytest.mark.parametrize("one_face", [False, True])
+def test_a_vertex_belongs_to_one_side_of_an_edge(one_face: bool) -> None:
+    """Also where a face that is smooth elsewhere meets itself at a sharp edge."""
+    mesh = cube_mesh(even, one_face=one_face)
     assert (mesh.face[mesh.triangles] == mesh.face[mesh.triangles[:, :1]]).all()
     normal = np.cross(*(np.diff(mesh.vertices[mesh.triangles], axis=1).transpose(1, 0, 2)))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
