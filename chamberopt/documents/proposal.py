@@ -13,6 +13,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from chamberopt.chamber.checks.fillets import OF_FILLET, OF_SLOT
 from chamberopt.chamber.layout.target import area_in_mm2
 from chamberopt.chamber.propose.first_design import START
@@ -239,6 +241,17 @@ def _target(made: Proposal) -> str:
     return made.reasons["part.target"].partition(": ")[0]
 
 
+def _target_level_mm(made: Proposal) -> int:
+    """Return how far from the sonotrode the target lies on the average [mm].
+
+    Farther away a strip saturates later.
+    """
+    part = made.chamber.part
+    height = part.vertices[part.triangles].mean(axis=1)[:, 2]
+    area = np.where(part.target, made.chamber.exposed_area, 0.0)
+    return round(1e3 * float(np.average(height, weights=area)))
+
+
 def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     """Yield name and value of each row, and the keys whose reasons belong to it."""
     tables, design = made.tables, made.design
@@ -276,8 +289,11 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     if INTENSITY in made.reasons:
         value = clauses(made.reasons[INTENSITY])[0][0].partition(": ")[0]
         yield "intensity", value, (INTENSITY,)
-        distance = f"{tables['chamber']['sonotrode_distance_mm']:g} mm from the sonotrode"
-        strips = f"in the lid in place of the part, {distance}: chamberopt strip"
+        level = _target_level_mm(made)
+        strips = (
+            f"in the lid in place of the part, {level} mm from the sonotrode as the middle of the "
+            f"target is: chamberopt strip --distance-mm {level}"
+        )
         yield "strips", why_no_strip(design, StripSize()) or strips, ()
     accuracy = design.process.accuracy
     simulated = f"{accuracy.replicas} replicas of {plain(accuracy.simulated_time, 3)} s"

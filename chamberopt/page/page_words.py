@@ -54,8 +54,9 @@ COMMANDS = {
 # Parts of messages that only a terminal needs: the page leaves them out.
 _TERMINAL = re.compile(
     "; press Ctrl-C again to stop now|; --no-ranges leaves them out"
-    "|(?<= mm from the sonotrode): chamberopt strip|(?<=more note): --verbose shows all"
-    "|(?<=more notes): --verbose shows all|(?m:^to resume: .*\\n?)"
+    "|(?<= of the target is): chamberopt strip --distance-mm [0-9]+"
+    "|(?<=more note): --verbose shows all|(?<=more notes): --verbose shows all"
+    "|(?m:^to resume: .*\\n?)"
     "|; to resume it: .*|; --tolerances simulates them too"
     r"| \(docs/[\w/]+\.md(?:#[\w-]+)?\)|(?:, or|;) use --at ZONE(?: with a zone of the part)?"
 )

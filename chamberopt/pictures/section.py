@@ -27,6 +27,7 @@ AREA, OUTLINE = 0.5, 0.5
 # Share of a score that counts off the chamber's axis, and of the best score from which on the plane
 # along the longer side is taken.
 AS_GOOD = 0.9
+EVEN = 0.02  # of the width: most distance of a cut's centroid from its middle
 SPECK = 1e-3  # share of the cut area below which a piece is none
 
 
@@ -48,8 +49,9 @@ def section_planes(chamber: Chamber) -> list[SectionPlane]:
     """Return one plane that shows the part best, or two across each other if one does not do.
 
     Of planes that show the part about alike, the one through the chamber's axis is taken, or
-    through the part's middle, along the longer side of the chamber. It is taken too where it shows
-    most of the part in one piece. Planes that miss the target are taken only if all do.
+    through the part's middle, best along the longer side of the chamber. It is taken too where it
+    shows most of the part in one piece, or its two sides alike, as of a ring. Planes that miss the
+    target are taken only if all do.
     """
     size = np.ptp(chamber.vertices, axis=0)
     longer = int(size[1] > size[0] + 1e-3 * SAME)
@@ -58,9 +60,10 @@ def section_planes(chamber: Chamber) -> list[SectionPlane]:
     found = [planes for planes in showing if planes] or found
     cuts = [one for planes in found for one in planes]
     most = max(one.area for one in cuts) or 1.0, max(one.target for one in cuts) or 1.0
-    best = [_best_plane(planes, most) for planes in found]
+    best = [_best_cut(planes, most) for planes in found]
     top = max(score for _, score in best)
-    planes = [plane for plane, _ in sorted(best, key=lambda one: one[1] < AS_GOOD * top)]
+    best.sort(key=lambda one: (one[1] < AS_GOOD * top, not one[0].is_central))
+    planes = [one.plane for one, _ in best]
     return planes[: 1 if planes[0].span >= ENOUGH else 2]
 
 
@@ -72,9 +75,10 @@ class _Cut(NamedTuple):
     target: float  # length of the target's line [m]
     pieces: int  # in which the part is seen
     is_central: bool  # through the chamber's axis, or through the middle of the part
+    is_even: bool  # as much of the part is on either side of the middle
 
 
-def _best_plane(planes: list[_Cut], most: tuple[float, float]) -> tuple[SectionPlane, float]:
+def _best_cut(planes: list[_Cut], most: tuple[float, float]) -> tuple[_Cut, float]:
     """Return the best of parallel planes with its score, of which central ones have an advantage.
 
     Args:
@@ -91,11 +95,13 @@ def _best_plane(planes: list[_Cut], most: tuple[float, float]) -> tuple[SectionP
     whole = [
         one
         for one in planes
-        if one.is_central and one.pieces == 1 and one.plane.span >= ENOUGH * best.plane.span
+        if one.is_central
+        and (one.pieces == 1 or one.is_even)
+        and one.plane.span >= ENOUGH * best.plane.span
     ]
     if not best.is_central and whole:
         best = max(whole, key=score)
-    return best.plane, score(best)
+    return best, score(best)
 
 
 def _planes(chamber: Chamber, right: int) -> list[_Cut]:
@@ -116,12 +122,21 @@ def _planes(chamber: Chamber, right: int) -> list[_Cut]:
         span = float(np.prod(np.ptp(ends, axis=0) / whole)) if len(ends) else 0.0
         # The lines go round the part, so that the shoelace formula holds without their order.
         (x1, y1), (x2, y2) = lines[:, 0].T, lines[:, 1].T
-        area = 0.5 * abs(float(np.sum(x1 * y2 - x2 * y1)))
+        turned = 0.5 * (x1 * y2 - x2 * y1)
+        area, wide = abs(float(turned.sum())), float(np.ptp(ends[:, 0])) if len(ends) else 0.0
+        # The centroid of the cut area, by the same formula, is in the middle.
+        aside = float(turned @ (x1 + x2)) / 3.0 - float(turned.sum()) * _middle(ends[:, 0])
+        is_even = abs(aside) < EVEN * area * wide
         plane = SectionPlane(right, 1e3 * float(at), span)
         on_target = np.linalg.norm(np.diff(lines[part.target[cut_ones]], axis=1), axis=2)
         is_central = number < len(central)
-        found.append(_Cut(plane, area, float(on_target.sum()), _pieces(lines), is_central))
+        on = float(on_target.sum())
+        found.append(_Cut(plane, area, on, _pieces(lines), is_central, is_even))
     return found
+
+
+def _middle(places: np.ndarray) -> float:
+    return 0.5 * float(places.min() + places.max()) if len(places) else 0.0
 
 
 def _pieces(lines: np.ndarray) -> int:
