@@ -721,10 +721,10 @@ def _checks(result: Result) -> Iterator[Row]:
     if intensity is None:
         strips = "A strips at 4 or 5 times, for chamberopt calibrate"
         rough = PredictedIntensity.of(result.metrics, calibration)
-        known = "not known before"
-        if rough is not None and design.process.intensity_mmA is not None:
+        known = "not known before: calibrates to mmA"
+        if rough is not None:
             known = f"{plain(rough.value, 2)} mmA, within a factor of {plain(rough.factor, 2)}"
-        yield strips, f"{known}: calibrates to mmA"
+        yield strips, known
     else:
         text = metric_label("almen_intensity").format(intensity)
         yield "intensity by A strips at the target", text
