@@ -80,7 +80,7 @@ class _EditableMesh:
 
     def slivers(self) -> list[int]:
         """Return the indices of the triangles that are now lower than MIN_HEIGHT."""
-        present = [k for k in dict.fromkeys(self.candidates) if k in self.triangles]
+        present = (k for k in dict.fromkeys(self.candidates) if k in self.triangles)
         return [k for k in present if self._height(self.triangles[k]) < MIN_HEIGHT]
 
     def surface(self) -> SolidSurface:

@@ -120,23 +120,33 @@ def _planes(chamber: Chamber, right: int) -> list[_Cut]:
         lines, cut_ones = cut(part.vertices, part.triangles, other, at)
         ends = lines.reshape(-1, 2)
         span = float(np.prod(np.ptp(ends, axis=0) / whole)) if len(ends) else 0.0
-        # The lines go round the part, so that the shoelace formula holds without their order.
-        (x1, y1), (x2, y2) = lines[:, 0].T, lines[:, 1].T
-        turned = 0.5 * (x1 * y2 - x2 * y1)
-        area, wide = abs(float(turned.sum())), float(np.ptp(ends[:, 0])) if len(ends) else 0.0
-        # The centroid of the cut area, by the same formula, is in the middle.
-        aside = float(turned @ (x1 + x2)) / 3.0 - float(turned.sum()) * _middle(ends[:, 0])
-        is_even = abs(aside) < EVEN * area * wide
+        area = abs(float(_turned(lines).sum()))
         plane = SectionPlane(right, 1e3 * float(at), span)
         on_target = np.linalg.norm(np.diff(lines[part.target[cut_ones]], axis=1), axis=2)
         is_central = number < len(central)
-        on = float(on_target.sum())
-        found.append(_Cut(plane, area, on, _pieces(lines), is_central, is_even))
+        pieces, is_even = _pieces(lines), _is_even(lines)
+        found.append(_Cut(plane, area, float(on_target.sum()), pieces, is_central, is_even))
     return found
 
 
-def _middle(places: np.ndarray) -> float:
-    return 0.5 * float(places.min() + places.max()) if len(places) else 0.0
+def _turned(lines: np.ndarray) -> np.ndarray:
+    """Return the area to the left of each line of a cut, seen from the origin, (k,) [m²].
+
+    The lines go round the part, so that by the shoelace formula the sum is the area of the cut,
+    whatever their order.
+    """
+    (x1, y1), (x2, y2) = lines[:, 0].T, lines[:, 1].T
+    return np.asarray(0.5 * (x1 * y2 - x2 * y1))
+
+
+def _is_even(lines: np.ndarray) -> bool:
+    """Return whether the centroid of a cut with lines (k, 2, 2) lies in the middle of its width."""
+    if not len(lines):
+        return False
+    turned, places = _turned(lines), lines[..., 0]
+    middle, area = 0.5 * float(places.min() + places.max()), float(turned.sum())
+    aside = float(turned @ places.sum(axis=1)) / 3.0 - area * middle
+    return abs(aside) < EVEN * abs(area) * float(np.ptp(places))
 
 
 def _pieces(lines: np.ndarray) -> int:
@@ -146,8 +156,7 @@ def _pieces(lines: np.ndarray) -> int:
     ends, numbers = np.unique(lines.reshape(-1, 2), axis=0, return_inverse=True)
     one, two = numbers.reshape(-1, 2).T
     count, loop = connected_pieces(one, two, len(ends))
-    (x1, y1), (x2, y2) = lines[:, 0].T, lines[:, 1].T
-    turned = np.bincount(loop[one], x1 * y2 - x2 * y1, count)
+    turned = np.bincount(loop[one], _turned(lines), count)
     least = SPECK * abs(turned.sum())
     return int((turned * np.sign(turned.sum()) > least).sum())
 

@@ -426,11 +426,9 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
     made = only_touched(made, floor, wanted.shop)
     if wanted.ball_mm is not None and touched_share(made) < LEAST_TOUCHED:
         raise InputError(_too_large(made, shop.stock_mm(shot)))
-    left_out = end is not None and end.target is not whole
     made = replace(
         made,
         reasons={**made.reasons, **room_reason(made, floor)},
-        leaves_end=left_out,
         stance=Stance(whole, turns, pose_reason, end, is_local),
     )
     if spare is None or end is not None or wanted.pose is not None or not grips_poorly(made):

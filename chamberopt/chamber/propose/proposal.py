@@ -137,7 +137,6 @@ class Proposal:
     is_capped: bool = False
     without_fillets: int = 0  # those of Wanted, to propose the same again
     thick_pose: Pose | None = None
-    leaves_end: bool = False  # true if the part is held by an end that its target leaves out
     closed: tuple[str, ...] = ()  # sides at which a face of the part is the wall, such as "-x"
     # Of all replicas of a candidate [s], to know the time in which its target is covered; None if
     # no pilot ran, or balls do not touch enough of the target.
@@ -147,6 +146,12 @@ class Proposal:
     predicted: PredictedIntensity | None = None  # by that pilot
     # Balls of several sizes that pilots compared, the smallest first; none without a pilot.
     trials: tuple[BallTrial, ...] = ()
+
+    @property
+    def leaves_end(self) -> bool:
+        """Whether an end, or all beside a strip, is left out of the target."""
+        stance = self.stance
+        return bool(stance and stance.end and stance.end.target is not stance.target)
 
     @property
     def settings(self) -> int:

@@ -29,13 +29,12 @@ FINEST = 0.2  # diameters of the gauge, at the border of the touchable surface (
 # its ends differ by more than STEP.
 BEND, STEP = 0.02, 0.05
 MAX_TRIANGLES = 400_000  # a part with more triangles keeps them undivided
-
-Values = Callable[[Places], np.ndarray]
-"""Coverage at some places, (p,); NaN where there is none."""
-
 # Angle between the normals of two corners of one face at one vertex, from which on a sharp edge is
 # between them, and how many sides of such edges at one vertex are told apart.
 SHARP_DEG, SIDES = 15.0, 4
+
+Values = Callable[[Places], np.ndarray]
+"""Coverage at some places, (p,); NaN where there is none."""
 
 
 @dataclass(frozen=True)
