@@ -20,7 +20,7 @@ ORDER = {
     ),
     "chamberopt/geometry": "triangles faces+heights+outline+solids+remesh+sight+thickness "
     "face_shapes meshes slivers+smoothing cut",
-    "chamberopt/geometry/smoothing": "rounds normals divide smooth part",
+    "chamberopt/geometry/smoothing": "rounds normals divide smooth part fillets",
     "chamberopt/geometry/meshes": "surface_error native_reader+units+raw_mesh+self_intersection "
     "healing+elements+step_tessellation abaqus+gmsh+nastran+obj+ply+step+stl+threemf+vtk formats "
     "part_mesh",

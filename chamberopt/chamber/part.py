@@ -14,7 +14,7 @@ from chamberopt.chamber.thin_part import thickness_to_simulate
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.cut import cut_at_box
-from chamberopt.geometry.faces import Faces
+from chamberopt.geometry.faces import Border, Faces
 from chamberopt.geometry.heights import lowest_over
 from chamberopt.geometry.meshes.part_mesh import (
     PartMesh,
@@ -24,6 +24,7 @@ from chamberopt.geometry.meshes.part_mesh import (
 )
 from chamberopt.geometry.remesh import remesh, triangle_quality
 from chamberopt.geometry.smoothing.divide import Surface
+from chamberopt.geometry.smoothing.fillets import face_at, faces_of
 from chamberopt.geometry.smoothing.part import SmoothingFacts, smooth
 from chamberopt.geometry.solids import snap_to_grid
 from chamberopt.geometry.triangles import (
@@ -85,17 +86,15 @@ def _on_faces(mesh: PartMesh, wanted: Sequence[FaceAt], field: str) -> np.ndarra
     Raises InputError if the point that selects a face is off the part's surface, or the file has no
     faces of its own where these are wanted.
     """
-    by_crease: dict[float | None, Faces] = {}
+    found: dict[Border, Faces] = {}
     chosen = np.zeros(len(mesh.triangles), dtype=bool)
     for k, one in enumerate(wanted):
-        if one.crease not in by_crease:
-            try:
-                by_crease[one.crease] = mesh.faces(one.crease)
-            except InputError as error:
-                raise InputError(f"{field}.faces.{k}.cad_face: {error}") from None
-        faces = by_crease[one.crease]
         place = np.array(one.at_mm) * 1e-3
-        face, away = faces.at(place)
+        try:
+            faces = found.setdefault(one.border, faces_of(mesh, one.border))
+            face, away = face_at(mesh, faces, one.border, place)
+        except InputError as error:
+            raise InputError(f"{field}.faces.{k}.{one.border}: {error}") from None
         if away > NEAR * np.linalg.norm(mesh.size):
             raise InputError(
                 f"{field}.faces.{k}.at_mm: given {list(one.at_mm)}, {1e3 * away:.3g} mm beside the "

@@ -23,11 +23,13 @@ from chamberopt.common.toml_fields import (
     quantity,
 )
 from chamberopt.design.table_base import FileTable
+from chamberopt.geometry.faces import Border
 from chamberopt.geometry.meshes.step_tessellation import Tessellation
 from chamberopt.geometry.meshes.units import Unit
 from chamberopt.geometry.smoothing.part import Rule
 
 MAX_FACES = 500
+DEFAULT_CREASE_DEG = 30.0
 
 
 class FaceAt(FileTable):
@@ -35,23 +37,36 @@ class FaceAt(FileTable):
 
     at_mm: Position = Field(description="a place on the face, in the part file's frame")
     crease_deg: float = quantity(
-        0.1, 180, "degrees", "the face ends where neighbouring triangles turn by more", 30.0
+        0.1,
+        180,
+        "degrees",
+        "the face ends where neighbouring triangles turn by more",
+        DEFAULT_CREASE_DEG,
     )
     cad_face: bool = Field(
         default=False,
         description="the face as the STEP file has it, also where it goes on smoothly; crease_deg "
         "is left out",
     )
+    fillet: bool = Field(
+        default=False,
+        description="the fillet as its curvature tells, also in a file of facets; crease_deg is "
+        "left out",
+    )
     alike: bool = Field(default=False, description="also all faces congruent with it, or mirrored")
 
     def _problems(self) -> Iterator[Problem]:
-        if self.cad_face and self.crease_deg != type(self).model_fields["crease_deg"].default:
-            yield Problem("crease_deg", "given beside cad_face, which has its own border")
+        if self.cad_face and self.fillet:
+            yield Problem("fillet", "given beside cad_face; give one of them")
+        elif not isinstance(self.border, float) and self.crease_deg != DEFAULT_CREASE_DEG:
+            yield Problem("crease_deg", f"given beside {self.border}, which has its own border")
 
     @property
-    def crease(self) -> float | None:
-        """Angle at which the face ends [degrees]; None where the CAD file says where it ends."""
-        return None if self.cad_face else self.crease_deg
+    def border(self) -> Border:
+        """What ends the face."""
+        if self.fillet:
+            return "fillet"
+        return "cad_face" if self.cad_face else self.crease_deg
 
 
 class Selection(FileTable):

@@ -19,8 +19,8 @@ RING = 0.1
 # so much of itself or more, and repeats: this share of its variance is that of one harmonic and of
 # its multiples.
 SWING, PERIODIC, ANGLES = 0.02, 0.8, 720
-# A fillet is a hollow face of a CAD file that goes on smoothly at this share of its border or more,
-# up to this angle. Its radius is less than this share of the part's size.
+# A fillet is a hollow face that goes on smoothly at this share of its border or more, up to this
+# angle. It is more hollow than it bulges. Its radius is less than this share of the part's size.
 SMOOTH_BORDER, SMOOTH_DEG, WIDE_FILLET = 0.5, 10.0, 0.2
 
 
@@ -91,11 +91,11 @@ def find_fillets(
     """Return the numbers of the faces that are fillets, and the curvature of each [1/m], both (k,).
 
     Args:
-        faces: of the surface, as its CAD file has them.
+        faces: of the surface, as its CAD file has them or as its curvature parts them.
         vertices, triangles: of the surface [m], (n, 3) and (m, 3).
         normals: at the corners of each triangle, (m, 3, 3).
     """
-    hollow = hollow_curvature(vertices, triangles, normals)
+    hollow = _hollow_curvature(vertices, triangles, normals)
     corner = np.arange(triangles.size).reshape(-1, 3)
     after = np.roll(corner, -1, axis=1).reshape(-1)  # of each corner, the next one of its triangle
     one, two = side_pairs(triangles).T  # a side begins at its corner, the other one ends there
@@ -108,16 +108,24 @@ def find_fillets(
         np.bincount(of, x, faces.count) + np.bincount(beyond, x, faces.count)
         for x in (long, smooth)
     )
-    least = 1.0 / (WIDE_FILLET * float(np.linalg.norm(np.ptp(vertices, axis=0))))
-    bent = np.array([np.median(hollow[faces.of_triangle == k]) for k in range(faces.count)])
-    found = np.flatnonzero((bent > least) & (goes_on >= SMOOTH_BORDER * border) & (border > 0.0))
-    return found, bent[found]
+    likely = np.flatnonzero((goes_on >= SMOOTH_BORDER * border) & (border > 0.0))
+    bent = np.array([np.median(hollow[faces.of_triangle == k]) for k in likely])
+    found = bent > least_curvature(vertices)
+    return likely[found], bent[found]
 
 
-def hollow_curvature(
+def least_curvature(vertices: np.ndarray) -> float:
+    """Return the least curvature of a part's fillets [1/m]."""
+    return 1.0 / (WIDE_FILLET * float(np.linalg.norm(np.ptp(vertices, axis=0))))
+
+
+def _hollow_curvature(
     vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray
 ) -> np.ndarray:
-    """Return the largest hollow curvature of each triangle [1/m], (m,), from its stated normals.
+    """Return the largest hollow curvature of each triangle [1/m], (m,), from its normals.
+
+    It is 0 where the surface bulges more in one direction than it is hollow in the other, as on the
+    inside of a coil.
 
     The curvatures along the three sides make up its second fundamental form: S. Rusinkiewicz,
     "Estimating Curvatures and Their Derivatives on Triangle Meshes" (2004).
@@ -135,4 +143,4 @@ def hollow_curvature(
     form = np.stack([u * u, 2.0 * u * v, v * v], axis=2) / square[..., None]
     value = np.einsum("mki,mki->mk", bend, step) / square
     p, q, r = np.einsum("mij,mj->mi", np.linalg.pinv(form), value).T
-    return np.asarray(np.hypot(0.5 * (p - r), q) - 0.5 * (p + r))
+    return np.where(p + r < 0.0, np.hypot(0.5 * (p - r), q) - 0.5 * (p + r), 0.0)

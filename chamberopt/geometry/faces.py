@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from chamberopt.geometry.triangles import (
     side_pairs,
     unit_vectors,
 )
+
+Border = float | Literal["cad_face", "fillet"]
+"""What parts a surface into faces: a crease angle [degrees], its CAD file, or its fillets."""
 
 SAME = 0.02  # relative difference of size and extent below which faces count as alike
 # A face of less than TINY of the whole area is a facet rather than a face. Where facets are more

@@ -40,6 +40,7 @@ from chamberopt.documents.report import answer_section
 from chamberopt.documents.study import aim_in_words
 from chamberopt.documents.wanted import times_longer
 from chamberopt.documents.wording import metric_label, value_text
+from chamberopt.geometry.faces import Border
 from chamberopt.page.answers import packed, part_answer, shape_answer, step_texts, surface_answer
 from chamberopt.page.checker import Checker
 from chamberopt.page.duration import duration_in_words
@@ -287,17 +288,17 @@ class Acts:
     def faces(self, asked: Any) -> bytes:
         """Return the number of the face to which each triangle of the part belongs."""
         mesh = preview_part(self._file(asked).design).mesh
-        return packed({}, face=self._picker.faces(mesh, _crease(asked)).of_triangle)
+        return packed({}, face=self._picker.faces(mesh, _border(asked)).of_triangle)
 
     def pick(self, asked: Any) -> dict[str, object]:
         design = self._file(asked).with_changes(asked["changes"])
-        triangle, crease = int(asked["triangle"]), _crease(asked)
+        triangle, border = int(asked["triangle"]), _border(asked)
         if asked["act"] == "down":
-            return self._picker.face_down(design, triangle, crease)
+            return self._picker.face_down(design, triangle, border)
         alike, add = bool(asked["alike"]), asked["act"] == "add"
         if asked["act"] == "face":
-            return {"faces": [self._picker.face(design, triangle, crease, alike)]}
-        return self._picker.with_face(design, asked["table"], triangle, crease, alike, add)
+            return {"faces": [self._picker.face(design, triangle, border, alike)]}
+        return self._picker.with_face(design, asked["table"], triangle, border, alike, add)
 
     def save(self, asked: Any) -> dict[str, object]:
         self._file(asked).save(asked["changes"])
@@ -521,10 +522,12 @@ class Acts:
         return free_folder(self._path.parent, Path("results", name))
 
 
-def _crease(asked: Any) -> float | None:
-    """Return the crease angle [degrees] that a page gives; None for the faces of a CAD file."""
-    crease = None if asked["crease_deg"] is None else float(asked["crease_deg"])
-    if crease is not None and not 0.1 <= crease <= 180.0:
+def _border(asked: Any) -> Border:
+    """Return what ends a face by what a page gives: no crease angle for a face of a CAD file."""
+    if asked["crease_deg"] is None:
+        return "cad_face"
+    crease = float(asked["crease_deg"])
+    if not 0.1 <= crease <= 180.0:
         raise InputError(f"crease angle: given {crease:g}; allowed: from 0.1 to 180 degrees")
     return crease
 

@@ -12,8 +12,9 @@ from chamberopt.chamber.part import PartPreview, chosen_triangles, preview_part
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.design.part import MAX_FACES, FaceAt, Selection
-from chamberopt.geometry.faces import Faces
+from chamberopt.geometry.faces import Border, Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.smoothing.fillets import faces_of
 from chamberopt.geometry.triangles import rotation_matrix
 from chamberopt.page.structure import MASK_KIND, OF_MASK, picked_surfaces
 
@@ -26,20 +27,14 @@ Row = dict[str, Any]  # an item of `faces` in a target's table
 class Picker:
     """Turns clicks on the part into changes of a design.
 
-    The part's faces, which meet at sharp edges, are found once for each crease angle.
+    The part's faces are found once for each way in which they end.
     """
 
     def __init__(self) -> None:
-        self._known: dict[tuple[int, float | None], tuple[PartMesh, Faces]] = {}
+        self._known: dict[tuple[int, Border], tuple[PartMesh, Faces]] = {}
 
     def with_face(
-        self,
-        design: Design,
-        table: str,
-        triangle: int,
-        crease_deg: float | None,
-        alike: bool,
-        add: bool,
+        self, design: Design, table: str, triangle: int, border: Border, alike: bool, add: bool
     ) -> dict[str, object]:
         """Return changes of a design that add the face of a triangle to a target, or remove it.
 
@@ -48,8 +43,8 @@ class Picker:
         Args:
             table: dotted name of the target, e.g. part.target.
             triangle: number of the triangle in the part's file.
-            crease_deg: angle between neighbouring triangles from which on they belong to two faces
-                [degrees]; None for the faces of a CAD file.
+            border: what ends the face: an angle between neighbouring triangles [degrees], or
+                another way.
             alike: whether all congruent faces are added or removed too.
             add: whether the face is added.
 
@@ -58,14 +53,14 @@ class Picker:
                 faces.
         """
         preview = preview_part(design)
-        mesh, faces = preview.mesh, self.faces(preview.mesh, crease_deg)
+        mesh, faces = preview.mesh, self.faces(preview.mesh, border)
         selection, chosen = _selection(design, table, preview)
         default = Selection()
         ways = [key for key in OTHER_WAYS if getattr(selection, key) != getattr(default, key)]
         if not ways and not selection.faces and add:  # the first face replaces the whole surface
             chosen = np.zeros_like(chosen)
         face = _face_of(faces, triangle)
-        row = _row(faces, face, crease_deg, alike)
+        row = _row(faces, face, border, alike)
         picked = self._mask(row, mesh)
         wanted = chosen | picked if add else chosen & ~picked
         if (wanted == chosen).all():
@@ -85,10 +80,10 @@ class Picker:
         for lacking in np.unique(faces.of_triangle[left]):
             if not wanted[faces.of_triangle == lacking].all():
                 raise InputError(
-                    f"{table}: its border does not follow {_in_words(crease_deg)}; take others, or "
+                    f"{table}: its border does not follow {_in_words(border)}; take others, or "
                     "clear it first"
                 )
-            rows.append(_row(faces, int(lacking), crease_deg))
+            rows.append(_row(faces, int(lacking), border))
         if len(rows) > MAX_FACES:
             raise InputError(f"{table}: {len(rows)} faces, more than {MAX_FACES}; take all alike")
         others: dict[str, object] = {f"{table}.{key}": None for key in ways}
@@ -99,14 +94,12 @@ class Picker:
             others |= {MASK_KIND: "shell", **{f"mask.{key}": None for key in OF_MASK}}
         return {f"{table}.faces": rows, **others}
 
-    def face(self, design: Design, triangle: int, crease_deg: float | None, alike: bool) -> Row:
+    def face(self, design: Design, triangle: int, border: Border, alike: bool) -> Row:
         """Return the face to which a triangle belongs, as an item of a design's list `faces`."""
-        faces = self.faces(preview_part(design).mesh, crease_deg)
-        return _row(faces, _face_of(faces, triangle), crease_deg, alike)
+        faces = self.faces(preview_part(design).mesh, border)
+        return _row(faces, _face_of(faces, triangle), border, alike)
 
-    def face_down(
-        self, design: Design, triangle: int, crease_deg: float | None
-    ) -> dict[str, object]:
+    def face_down(self, design: Design, triangle: int, border: Border) -> dict[str, object]:
         """Return changes of a design that lay a face of the part level, towards the sonotrode.
 
         The part is squared to the walls, and a chamber of simple form gets the sizes that `new`
@@ -114,11 +107,11 @@ class Picker:
 
         Args:
             triangle: number of a triangle of the face.
-            crease_deg: angle between neighbouring triangles from which on they belong to two faces
-                [degrees]; None for the faces of a CAD file.
+            border: what ends the face: an angle between neighbouring triangles [degrees], or
+                another way.
         """
         preview = preview_part(design)
-        mesh, faces = preview.mesh, self.faces(preview.mesh, crease_deg)
+        mesh, faces = preview.mesh, self.faces(preview.mesh, border)
         normal = faces.normal(_face_of(faces, triangle))
         if not normal.any():
             raise InputError("this face bends all round and faces no way; click another one")
@@ -134,19 +127,19 @@ class Picker:
             changes |= {f"part.offset_mm.{k}": 0.0 for k in (0, 1) if design.part.offset[k]}
         return changes
 
-    def faces(self, mesh: PartMesh, crease_deg: float | None) -> Faces:
-        """Return the part's faces that meet at a crease angle; None for those of a CAD file."""
-        key = id(mesh), crease_deg
+    def faces(self, mesh: PartMesh, border: Border) -> Faces:
+        """Return the part's faces that end at a border."""
+        key = id(mesh), border
         if key not in self._known:
             if len(self._known) > 8:
                 self._known.clear()
-            faces = mesh.faces(crease_deg)
+            faces = faces_of(mesh, border)
             self._known[key] = mesh, faces  # a mesh that is kept keeps its id
         return self._known[key][1]
 
     def _mask(self, row: Row, mesh: PartMesh) -> np.ndarray:
         """Return True for each triangle that an item of a design's list `faces` chooses, (m,)."""
-        faces = self.faces(mesh, FaceAt.model_validate(row).crease)
+        faces = self.faces(mesh, FaceAt.model_validate(row).border)
         face, _ = faces.at(1e-3 * np.array(row["at_mm"]))
         if row.get("alike"):
             return np.asarray(faces.alike(face)[faces.of_triangle])
@@ -181,12 +174,12 @@ def _face_of(faces: Faces, triangle: int) -> int:
     return int(faces.of_triangle[triangle])
 
 
-def _row(faces: Faces, face: int, crease_deg: float | None, alike: bool = False) -> Row:
+def _row(faces: Faces, face: int, border: Border, alike: bool = False) -> Row:
     x, y, z = (round(1e3 * float(x), DIGITS) + 0.0 for x in faces.place(face))
-    border = {"cad_face": True} if crease_deg is None else {"crease_deg": crease_deg}
-    made = FaceAt.model_validate({"at_mm": (x, y, z), "alike": alike, **border})
+    ends = {"crease_deg": border} if isinstance(border, float) else {border: True}
+    made = FaceAt.model_validate({"at_mm": (x, y, z), "alike": alike, **ends})
     return made.model_dump(mode="json", exclude_defaults=True)
 
 
-def _in_words(crease_deg: float | None) -> str:
-    return "faces of the CAD file" if crease_deg is None else f"faces at {crease_deg:g} degrees"
+def _in_words(border: Border) -> str:
+    return f"faces at {border:g} degrees" if isinstance(border, float) else "faces of the CAD file"

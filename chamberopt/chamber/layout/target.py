@@ -16,14 +16,9 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
-from chamberopt.geometry.face_shapes import (
-    PATTERN,
-    find_fillets,
-    is_inside_of_tube,
-    is_ring,
-    teeth_of,
-)
+from chamberopt.geometry.face_shapes import PATTERN, is_inside_of_tube, is_ring, teeth_of
 from chamberopt.geometry.meshes.part_mesh import PartMesh, select_triangles
+from chamberopt.geometry.smoothing.fillets import faces_of, fillets_of
 from chamberopt.geometry.triangles import areas, border_edges, centre_of_mass
 
 TOLD = 0.5  # share of a surface that others named tell of, from which on it is not named
@@ -67,7 +62,7 @@ BY_PROGRAM = re.compile(r"(?:created|exported|generated|written)[\s_-]+(?:by|fro
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
 FACE = re.compile(r"face (\d+)", re.I)
 AROUND = 0.1  # share of the fillets' area from which on a face is one in which they lie
-SAME_RADIUS = 0.02  # relative difference of radii below which fillets are of one radius
+SAME_RADIUS = 0.05  # relative difference of radii below which fillets are of one radius
 MOST_NAMED = 5  # surfaces of a target that are named; of more, the first are
 Keys = dict[str, Any]
 """Keys of [part.target], "surface" or "faces", and their values."""
@@ -173,7 +168,7 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
     if special:
         special.sort(key=lambda one: SELDOM.search(one.name) is not None)
         return _joined(special[:1], by_size("the largest surface that the file names", special[1:]))
-    fillets = [one for one in faces if one.keys["faces"][0].get("cad_face")]
+    fillets = [one for one in faces if {"cad_face", "fillet"}.intersection(one.keys["faces"][0])]
     faces = [one for one in faces if one not in fillets]
     repeated = [one for one in faces if one.keys["faces"][0].get("alike")]
     counts = {one.name: _count(one) for one in repeated}
@@ -310,18 +305,17 @@ def _faces(mesh: PartMesh) -> list[Surface]:
 
 
 def _fillets(mesh: PartMesh) -> list[Surface]:
-    """Return the fillets of a part from CAD, those of one radius as one surface, by their area."""
-    if mesh.numbering.cad_face is None or mesh.normals is None:
-        return []
-    faces = mesh.faces(None)
-    left, bent = find_fillets(faces, mesh.vertices, mesh.triangles, mesh.normals)
-    found = []
+    """Return the fillets of a part, those of one radius as one surface, by their area."""
+    fillets, faces = fillets_of(mesh), faces_of(mesh, "fillet")
+    first = [np.flatnonzero(fillets.of_triangle == k)[0] for k in range(len(fillets.curvature))]
+    left, bent, found = faces.of_triangle[first], fillets.curvature, []
+    own_key = "fillet" if mesh.numbering.cad_face is None else "cad_face"
     while len(left):
         widest = bent[faces.area[left].argmax()]
         is_alike = np.abs(bent / widest - 1.0) < SAME_RADIUS
         own, left, bent = left[is_alike], left[~is_alike], bent[~is_alike]
         area = float(faces.area[own].sum())
-        keys = [{"at_mm": faces.place_mm(int(k)), "cad_face": True} for k in own]
+        keys = [{"at_mm": faces.place_mm(int(k)), own_key: True} for k in own]
         count = f"{len(own)} faces, " if len(own) > 1 else ""
         name, marked = f"fillets of {1e3 / widest:.3g} mm", np.isin(faces.of_triangle, own)
         found.append((area, Surface(name, {"faces": keys}, marked, count + area_in_mm2(area))))

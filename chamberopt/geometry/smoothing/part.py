@@ -190,7 +190,7 @@ def _smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
         zones: rules for surfaces with limits of their own, which may lie on the target.
     """
     rules = [target, *zones]
-    if mesh.normals is None and _has_points_in_facets(mesh, rules):
+    if mesh.normals is None and has_points_in_facets(mesh, rules):
         plain, plain_rules = _without_points_in_planes(mesh, rules)
         found = _divided(plain, plain_rules[0], plain_rules[1:])
         if len(found.triangles) > len(plain.triangles):
@@ -198,7 +198,7 @@ def _smooth(mesh: PartMesh, target: Rule, zones: list[Rule]) -> SmoothPart:
     return _divided(mesh, target, zones)
 
 
-def _has_points_in_facets(mesh: PartMesh, rules: list[Rule]) -> bool:
+def has_points_in_facets(mesh: PartMesh, rules: list[Rule]) -> bool:
     """Return True if a facet to be divided has vertices of the file in its interior.
 
     Such vertices are on the facet, and not on the curved surface behind it.

@@ -176,22 +176,42 @@ def test_a_click_takes_a_face_as_the_cad_file_has_it(tmp_path: Path) -> None:
     fillets = next(one for one in surfaces(mesh) if one.name.startswith("fillets"))
     first = int(np.flatnonzero(fillets.triangles)[0])
     picker = Picker()
-    for crease, alone in ((None, True), (30.0, False)):
-        row = picker.face(design, first, crease, alike=False)
+    for border, alone in (("cad_face", True), (30.0, False)):
+        row = picker.face(design, first, border, alike=False)
         assert ("cad_face" in row) is alone
         keys = Selection.model_validate({"faces": [row]})
         own = chosen_triangles(mesh, keys)
         assert bool((own & ~fillets.triangles).any()) is not alone
-    changes = picker.with_face(design, TARGET, first, None, alike=False, add=True)
-    assert changes[f"{TARGET}.faces"] == [picker.face(design, first, None, alike=False)]
+    changes = picker.with_face(design, TARGET, first, "cad_face", alike=False, add=True)
+    assert changes[f"{TARGET}.faces"] == [picker.face(design, first, "cad_face", alike=False)]
 
 
 def test_a_part_without_faces_of_its_own_is_told_so(gear: Edited) -> None:
     with pytest.raises(InputError, match="no faces of its own, as STEP has; leave cad_face out"):
-        gear.picker.face(gear.design, 0, None, alike=False)
+        gear.picker.face(gear.design, 0, "cad_face", alike=False)
     row = {"at_mm": [0.0, 0.0, 0.0], "cad_face": True}
     design = gear.design.changed({"part.target": {"faces": [row]}})
     with pytest.raises(InputError, match=r"part\.target\.faces\.0\.cad_face: the part's file has"):
         preview_part(design)
     with pytest.raises(InputError, match="crease_deg: given beside cad_face"):
         gear.design.changed({"part.target": {"faces": [{**row, "crease_deg": 20.0}]}})
+
+
+def test_a_fillet_of_facets_is_a_face_of_its_own(gear: Edited) -> None:
+    """The roots of the gear's teeth, each between the file's facets on both flanks."""
+    mesh = preview_part(gear.design).mesh
+    roots = next(one for one in surfaces(mesh) if one.name.startswith("fillets of"))
+    rows = roots.keys["faces"]
+    assert [set(row) for row in rows] == [{"at_mm", "fillet"}] * 20
+    chosen = chosen_triangles(mesh, Selection.model_validate(roots.keys))
+    assert (chosen == roots.triangles).all()
+    design = gear.design.changed({"part.target": {"faces": rows}})
+    first = int(np.flatnonzero(chosen)[0])
+    changes = gear.picker.with_face(design, TARGET, first, "fillet", alike=False, add=False)
+    assert len(changes[f"{TARGET}.faces"]) == 19
+    with pytest.raises(InputError, match=r"faces\.0\.fillet: the surface is no fillet there"):
+        preview_part(
+            gear.design.changed({"part.target.faces": [{**rows[0], "at_mm": [0, 12, 10]}]})
+        )
+    with pytest.raises(InputError, match="fillet: given beside cad_face; give one of them"):
+        gear.design.changed({"part.target": {"faces": [{**rows[0], "cad_face": True}]}})

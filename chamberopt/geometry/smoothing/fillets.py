@@ -1,0 +1,106 @@
+"""Find the fillets of a part: faces of its CAD file, or rounds that the facets of its file make.
+
+A file of facets does not say where a fillet begins. Its fillets are found by the curvature of the
+smooth surface behind the facets. They are of like curvature all over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from chamberopt.common.errors import InputError
+from chamberopt.geometry.face_shapes import find_fillets, least_curvature
+from chamberopt.geometry.faces import Border, Faces
+from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.smoothing.normals import plane_facets
+from chamberopt.geometry.smoothing.part import Rule, has_points_in_facets, kept, key_of
+from chamberopt.geometry.smoothing.rounds import find_edges
+from chamberopt.geometry.smoothing.smooth import find_surfaces
+from chamberopt.geometry.solids import simplify_planes
+from chamberopt.geometry.triangles import connected_pieces, side_pairs
+
+ALIKE = 1.5  # largest ratio of the curvatures of neighbours in one fillet
+LEAST = 0.01  # share of the area of all fillets, below which a round is none, as where two meet
+LEAST_TURN = np.radians(1.0)  # of facets that make a round
+MOST_PARTS = 4  # whose fillets are kept in memory
+
+
+@dataclass(frozen=True)
+class FilletNumbers:
+    """The fillets of a part's triangles.
+
+    Attributes:
+        of_triangle: number of the fillet of each triangle, -1 for none, (m,).
+        curvature: of each fillet [1/m], (k,).
+    """
+
+    of_triangle: np.ndarray
+    curvature: np.ndarray
+
+
+def faces_of(mesh: PartMesh, border: Border) -> Faces:
+    """Return the faces of a part. Raises InputError if its file has no such faces."""
+    if border == "fillet":
+        return Faces(mesh.vertices, mesh.triangles, fillets_of(mesh).of_triangle)
+    return mesh.faces(None if border == "cad_face" else border)
+
+
+def face_at(mesh: PartMesh, faces: Faces, border: Border, place: np.ndarray) -> tuple[int, float]:
+    """Return the number of the face closest to a point (3,) [m], and its distance [m].
+
+    Raises InputError if a fillet is asked for, and there is none.
+    """
+    face, away = faces.at(place)
+    if border == "fillet" and (fillets_of(mesh).of_triangle[faces.of_triangle == face] < 0).any():
+        raise InputError("the surface is no fillet there; take a crease_deg in its place")
+    return face, away
+
+
+@lru_cache(maxsize=MOST_PARTS)
+def fillets_of(mesh: PartMesh) -> FilletNumbers:
+    """Return the fillets of a part, loaded if an earlier command has found them."""
+    if mesh.numbering.cad_face is not None and mesh.normals is not None:
+        faces = mesh.faces(None)
+        found = find_fillets(faces, mesh.vertices, mesh.triangles, mesh.normals)
+        return _numbered(faces.of_triangle, *found)
+    key = key_of(["fillets", mesh.vertices, mesh.triangles, mesh.normals])
+    return kept(FilletNumbers, (), key, lambda: _fillets_of_facets(mesh))
+
+
+def _fillets_of_facets(mesh: PartMesh) -> FilletNumbers:
+    """Return the fillets of a part whose file has no faces of its own."""
+    vertices, triangles = mesh.vertices, mesh.triangles
+    facet = plane_facets(find_edges(vertices, triangles), len(triangles))
+    every = np.ones(len(triangles), dtype=bool)
+    rule = Rule(every, False, turn=LEAST_TURN, narrow=0.0, tolerance=np.inf)
+    if mesh.normals is None and has_points_in_facets(mesh, [rule]):
+        # A facet is one face with few triangles again, as it is in a round.
+        vertices, triangles, own = simplify_planes(vertices, triangles, facet)
+        every = np.ones(len(triangles), dtype=bool)
+    else:
+        facet = own = np.arange(len(triangles))
+    found = find_surfaces(vertices, triangles, every, mesh.normals)
+    bends = (found.hollow > least_curvature(vertices)) & ~found.noisy
+    pairs = side_pairs(triangles)
+    one, two = pairs[~found.crease.ravel()[pairs].any(axis=1)].T // 3
+    curvature = np.stack([found.hollow[one], found.hollow[two]])
+    goes_on = bends[one] & bends[two] & (curvature.max(axis=0) < ALIKE * curvature.min(axis=0))
+    piece = connected_pieces(one[goes_on], two[goes_on], len(triangles))[1]
+    faces = Faces(vertices, triangles, np.where(bends, piece, -1))
+    number, bent = find_fillets(faces, vertices, triangles, found.normals)
+    area = faces.area[number]
+    is_large = area >= LEAST * area.sum()
+    made = _numbered(faces.of_triangle, number[is_large], bent[is_large])
+    of_facet = np.full(int(facet.max()) + 1, -1)
+    of_facet[own] = made.of_triangle
+    return FilletNumbers(of_facet[facet], made.curvature)
+
+
+def _numbered(face: np.ndarray, fillets: np.ndarray, curvature: np.ndarray) -> FilletNumbers:
+    """Return fillets by their numbers among the faces (m,) of a part's triangles."""
+    number = np.full(int(face.max()) + 1, -1)
+    number[fillets] = np.arange(len(fillets))
+    return FilletNumbers(number[face], curvature)

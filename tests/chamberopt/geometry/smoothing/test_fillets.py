@@ -1,0 +1,99 @@
+"""Fillets of files without faces: their radius, area and number, however the facets are cut."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from chamberopt.common.errors import InputError
+from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.geometry.meshes.raw_mesh import number_by_position
+from chamberopt.geometry.smoothing.fillets import face_at, faces_of, fillets_of
+from chamberopt.geometry.triangles import areas, rotation_matrix
+from tests.chamberopt.geometry.smoothing.test_exact_solids import BALL, BLOCKS, SHAFT, TORUS
+from tests.helpers.scenes.rounded_solids import Mesh, Solid, circle, outline
+
+
+def part(mesh: Mesh) -> PartMesh:
+    vertices, triangles = mesh
+    numbers = number_by_position(len(triangles))
+    return PartMesh(vertices, np.asarray(triangles, np.int32), numbers, (), "")
+
+
+def area_of(mesh: PartMesh, fillet: int) -> float:
+    own = fillets_of(mesh).of_triangle == fillet
+    return float(areas(mesh.vertices, mesh.triangles)[own].sum())
+
+
+@pytest.mark.parametrize("degrees", [5.0, 10.0, 22.5, 30.0])
+@pytest.mark.parametrize("times", BLOCKS)
+def test_a_fillet_of_a_block_is_found(times: float, degrees: float) -> None:
+    mesh = part(BLOCKS[times].strips(np.radians(degrees)))
+    (curvature,) = fillets_of(mesh).curvature
+    assert curvature * times * BALL == pytest.approx(1.0, abs=0.02)
+    quarter = 0.5 * np.pi * times * BALL * 10 * BALL
+    assert area_of(mesh, 0) == pytest.approx(quarter, rel=0.02)
+
+
+@pytest.mark.parametrize("degrees", [10.0, 22.5])
+def test_the_fillet_of_a_shaft_goes_all_round(degrees: float) -> None:
+    mesh = part(SHAFT.strips(np.radians(degrees)))
+    (curvature,) = fillets_of(mesh).curvature
+    assert curvature * 1.5 * BALL == pytest.approx(1.0, abs=0.05)
+    # a quarter of a circle of 1.5 r round an axis, its centre 7.5 r off: Pappus
+    middle = 7.5 * BALL - 1.5 * BALL * 2.0 / np.pi
+    exact = 0.5 * np.pi * 1.5 * BALL * 2.0 * np.pi * middle
+    assert area_of(mesh, 0) == pytest.approx(exact, rel=0.05)
+
+
+@pytest.mark.parametrize("change", ["divided", "shuffled", "turned", "irregular"])
+def test_the_cut_of_the_facets_does_not_count(change: str) -> None:
+    vertices, triangles = BLOCKS[1.5].strips(np.radians(22.5))
+    if change == "divided":
+        vertices, triangles = trimesh.remesh.subdivide(vertices, triangles)
+        vertices, triangles = trimesh.remesh.subdivide(vertices, triangles)
+    if change == "shuffled":
+        triangles = np.random.default_rng(1).permutation(triangles)
+    if change == "turned":
+        vertices = vertices @ rotation_matrix((17.0, 40.0, 5.0)).T + 0.03
+    if change == "irregular":
+        vertices, triangles = BLOCKS[1.5].irregular(np.radians(15.0), 4e-3)
+    mesh = part((vertices, triangles))
+    (curvature,) = fillets_of(mesh).curvature
+    assert curvature * 1.5 * BALL == pytest.approx(1.0, abs=0.05)
+    quarter = 0.5 * np.pi * 1.5 * BALL * 10 * BALL
+    assert area_of(mesh, 0) == pytest.approx(quarter, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    "solid",
+    [
+        pytest.param(Solid(circle(5 * BALL), 10 * BALL), id="a cylinder"),
+        pytest.param(TORUS, id="the inside of a coil, which bulges more than it is hollow"),
+        pytest.param(
+            Solid(outline([(4e-3, 0), (9e-3, 0), (9e-3, 9e-3), (4e-3, 9e-3)])),
+            id="a bore, which ends at sharp edges",
+        ),
+        pytest.param(
+            Solid(
+                outline([(0, 0), (20 * BALL, 0), (20 * BALL, 5 * BALL), (10 * BALL, 5 * BALL),
+                         (8 * BALL, 7 * BALL), (8 * BALL, 15 * BALL), (0, 15 * BALL)]),
+                10 * BALL,
+            ),
+            id="a bevel of 45 degrees",
+        ),
+    ],
+)  # fmt: skip
+def test_what_is_no_fillet(solid: Solid) -> None:
+    assert not len(fillets_of(part(solid.strips(np.radians(15.0)))).curvature)
+
+
+def test_a_place_beside_a_fillet_is_refused() -> None:
+    mesh = part(BLOCKS[3.0].strips(np.radians(15.0)))
+    faces = faces_of(mesh, "fillet")
+    own = fillets_of(mesh).of_triangle == 0
+    inside = mesh.vertices[mesh.triangles[own][0]].mean(axis=0)
+    face, away = face_at(mesh, faces, "fillet", inside)
+    assert away < 1e-9
+    assert ((faces.of_triangle == face) == own).all()
+    with pytest.raises(InputError, match="no fillet there"):
+        face_at(mesh, faces, "fillet", mesh.vertices[mesh.vertices[:, 1].argmax()])
