@@ -194,6 +194,9 @@ def _coloured(
         if job["is_held_outside"]:
             low, high = np.reshape(chamber.bounds, (3, 2)).T
             stands_out = ((corners < low - CLEAR) | (corners > high + CLEAR)).any(axis=(1, 2))
+            radius = np.linalg.norm(chamber.points[:, :2], axis=1).max()  # of a round chamber
+            far = np.linalg.norm(corners[..., :2], axis=2).max(axis=1)
+            stands_out |= far > radius + CLEAR
             outside[stands_out & (outside == PLAIN)] = HELD
     return part, [(part, outside), (inside, own)]
 

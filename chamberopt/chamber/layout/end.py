@@ -66,6 +66,7 @@ FACING, CLOSES, BEFORE, BEHIND = 0.999, 0.5, 1e-5, 0.2e-3
 # What stands into the chamber by no more than INTO [m], such as the rim of such a face, may come
 # nearer to the sonotrode: share of the distance that is left.
 NEAREST, INTO = 0.25, 0.5e-3
+CORNERS = 90  # of a circle's outline
 
 
 class Strips(NamedTuple):
@@ -393,7 +394,7 @@ def closing_faces(
 
 
 class LocalRoom(NamedTuple):
-    """A box round a target, out of which the part goes through the walls."""
+    """A box or cylinder round a target, out of which the part goes through the walls."""
 
     sizes: Sizes
     walls: np.ndarray  # places of its walls along -x and -y, and along x and y, in the pose [m]
@@ -407,14 +408,13 @@ class LocalRoom(NamedTuple):
         return replace(sizes, height=height, top=sizes.top + more) if more else sizes
 
     def plan(self, sizes: Sizes) -> np.ndarray:
-        """Return the corners (4, 2) [m] of the box in the pose if it gets other sizes."""
-        half = 5e-4 * np.array([sizes.plan["length_mm"], sizes.plan["width_mm"]], dtype=float)
-        return _rectangle(self.middle(sizes) + half * np.array([[-1.0], [1.0]]))
+        """Return the outline (k, 2) [m] of the room in the pose if it gets other sizes."""
+        walls = self.middle(sizes) + 0.5 * _lengths(sizes) * np.array([[-1.0], [1.0]])
+        return _outline(sizes.shape, walls)
 
     def middle(self, sizes: Sizes) -> np.ndarray:
-        """Return the middle in plan (2,) [m] of the box if it gets other sizes."""
-        lengths = 1e-3 * np.array([sizes.plan["length_mm"], sizes.plan["width_mm"]], dtype=float)
-        longer = 0.5 * (lengths - np.ptp(self.walls, axis=0))
+        """Return the middle in plan (2,) [m] of the room if it gets other sizes."""
+        longer = 0.5 * (_lengths(sizes) - np.ptp(self.walls, axis=0))
         shift = self.kept[0] * 1.0 - self.kept[1]
         return np.asarray(self.walls.mean(axis=0) + shift * longer)
 
@@ -426,16 +426,21 @@ def local_room(
     sizes: Sizes,
     at_wall: float | None,
 ) -> LocalRoom:
-    """Return the box round a target that ends where faces of the part are its walls.
+    """Return the room round a target that ends where faces of the part are its walls.
+
+    A face closes a cylinder as its lid, and a box also at its sides.
 
     Args:
         posed, triangles, target: as of closing_faces.
-        sizes: those of a box with the usual room beside and above the target.
+        sizes: those of a box or cylinder with the usual room beside and above the target.
         at_wall: distance from the target of the wall through which an end goes out along x [m]. The
             wall at the other end is as near, if the part goes out through it too.
     """
     on_target = posed[np.unique(triangles[target])]
     faces = closing_faces(posed, triangles, target, sizes.gap) + BEHIND * np.array([[-1.0], [1.0]])
+    is_box = sizes.shape == "box"
+    if not is_box:
+        faces[:, :2] = np.nan
     if at_wall is not None:  # a wall of its own is nearer than such a face
         ends = np.array([on_target.min(axis=0)[0], on_target.max(axis=0)[0]])
         faces[np.abs(faces[:, 0] - ends) > at_wall, 0] = np.nan
@@ -444,6 +449,9 @@ def local_room(
     if at_wall is not None:
         near[:] = float(posed[:, 0].min()) < walls[0, 0], True
         walls[:, 0] += near * (at_wall - sizes.gap) * np.array([-1.0, 1.0])
+    if not is_box:
+        middle = 0.5 * (on_target.min(axis=0) + on_target.max(axis=0))[:2]
+        walls[:, :2] = middle + 0.5 * _lengths(sizes) * np.array([[-1.0], [1.0]])
     closes = np.isfinite(faces)
     walls, kept = np.where(closes, faces, walls)[:, :2], np.array(closes[:, :2])
     kept[:, 0] |= near
@@ -452,7 +460,9 @@ def local_room(
         if kept[:, k].any():
             plan[key] = _up_half_mm(walls[1, k] - walls[0, k])
     lowest, inner = (
-        lowest_over(posed, triangles, _rectangle(walls + into * np.array([[1.0], [-1.0]])))
+        lowest_over(
+            posed, triangles, _outline(sizes.shape, walls + into * np.array([[1.0], [-1.0]]))
+        )
         for into in (0.0, INTO)
     )
     if not math.isfinite(inner):
@@ -474,10 +484,20 @@ def local_room(
     return LocalRoom(sizes, walls, kept, lowest)
 
 
-def _rectangle(walls: np.ndarray) -> np.ndarray:
-    """Return the corners (4, 2) of the rectangle between walls (2, 2), counter-clockwise."""
-    (left, front), (right, back) = walls
-    return np.array([[left, front], [right, front], [right, back], [left, back]])
+def _lengths(sizes: Sizes) -> np.ndarray:
+    """Return the length and width [m] of a box or cylinder, (2,)."""
+    keys = ("length_mm", "width_mm") if sizes.shape == "box" else ("diameter_mm",) * 2
+    return 1e-3 * np.array([sizes.plan[key] for key in keys], dtype=float)
+
+
+def _outline(shape: str, walls: np.ndarray) -> np.ndarray:
+    """Return the outline (k, 2) of a box or cylinder between walls (2, 2), counter-clockwise."""
+    if shape == "box":
+        (left, front), (right, back) = walls
+        return np.array([[left, front], [right, front], [right, back], [left, back]])
+    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)[:, None]
+    half = 0.5 * np.ptp(walls, axis=0)
+    return np.asarray(walls.mean(axis=0) + half * np.hstack([np.cos(angle), np.sin(angle)]))
 
 
 def _up_half_mm(length: float) -> float:

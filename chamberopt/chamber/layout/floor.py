@@ -31,7 +31,7 @@ from chamberopt.design.fixture import slit_in_words
 from chamberopt.design.sonotrode import Face
 from chamberopt.geometry.heights import lowest_over
 
-TIGHTER = 0.6  # share of the room beside the part that is left, so that the walls stand upright
+TIGHTER = 0.5  # share of the room beside the part that is left, so that the walls stand upright
 STEEPEST = 30.0  # degrees: walls that lean more throw the balls up rather than inwards
 FARTHER = 1.5  # factor by which the sonotrode's distance may grow, so that walls lean less
 WIDEST = 25e-3  # m: how far a leaning wall may move out up to the ceiling

@@ -396,7 +396,8 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
         if is_large and not is_local and like is None:
             with suppress(InputError):
                 local, its_floor = built(is_local=True)
-                if its_floor.is_one_sonotrode and not local.is_capped:
+                takes_fewer = its_floor.excess[:2] < floor.excess[:2]  # sonotrodes
+                if (takes_fewer or made.is_capped) and not local.is_capped:
                     if not local.chamber.pieces_in_air:
                         local = clamped_outside(local, its_floor, wanted.shop)
                         local = padded(local, its_floor, target, wanted.shop, like)

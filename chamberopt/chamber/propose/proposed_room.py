@@ -30,6 +30,7 @@ from chamberopt.geometry.triangles import rotation_matrix
 
 AT_WALL = 2.0  # ball diameters from the target to the wall through which its end goes out
 OVER_RIM = (0.0, 2.5e-3, 5e-3)  # m over the ceiling at which a clamp may begin, as over a flange
+ROUND = 1.1  # largest diameter of a round target over its least side
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 BETWEEN = "a plate that fits between the faces of the part, like the two walls beside them"
 CUT_OUT = "plates, cut out round it"
@@ -49,6 +50,7 @@ def place_room(
 
     The form of the chamber is the wanted one, else a cylinder where a sonotrode carries it. Else it
     is that whose walls lean less, or the smaller one: a cylinder, or the form that suits the part.
+    Round a target it is a box, or a cylinder where a lid closes it over a round target.
 
     Args:
         turns: turns that bring the target down; the part may still be turned about z.
@@ -65,7 +67,10 @@ def place_room(
         square = end_to_wall(turns, out)
     suits = shape_for(np.ptp(part.vertices @ rotation_matrix(square).T, axis=0))
     refused: InputError | None = None
-    usual = ["box"] if is_local else ["cylinder", suits]
+    usual = ["cylinder", suits]
+    if is_local:
+        is_round = out is None and _is_round(part.vertices @ rotation_matrix(turns).T, part)
+        usual = ["cylinder", "box"] if is_round else ["box"]
     for shape in dict.fromkeys([wanted.shape] if wanted.shape else usual):
         placed = square if shape == "box" else turns
         posed = part.vertices @ rotation_matrix(placed).T
@@ -82,7 +87,7 @@ def place_room(
         ):  # a higher ceiling takes in the whole part
             sizes = propose_sizes(posed, float(posed[:, 2].max()), ball, shape, wider)
         local = None
-        if is_local and shape == "box":
+        if is_local and shape in ("box", "cylinder"):
             at_wall = None if out is None else AT_WALL * wider * ball
             local = local_room(posed, part.triangles, part.target, sizes, at_wall)
             sizes = local.sizes
@@ -113,7 +118,20 @@ def place_room(
         found.append((placed, floor))
     if refused and not found:
         raise refused
+    if is_local and any(one.sizes.closed != ("z",) for _, one in found):  # not by a lid alone
+        found = [one for one in found if one[1].sizes.shape == "box"] or found
     return min(found, key=lambda one: one[1].excess)
+
+
+def _is_round(posed: np.ndarray, part: Shape) -> bool:
+    """Return whether a target is round as seen from above, as a fillet round a hub is.
+
+    Args:
+        posed: vertices of the part in its pose [m], (n, 3).
+    """
+    plan = posed[np.unique(part.triangles[part.target]), :2]
+    radius = np.linalg.norm(plan - middle_in_plan(plan), axis=1).max()
+    return bool(2.0 * radius < ROUND * np.ptp(plan, axis=0).min())
 
 
 def can_be_mounted(

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import CrossSection, Manifold
 from shapely import Polygon
 
 from chamberopt.chamber.checks.warning import WarningKind
@@ -17,7 +18,12 @@ from chamberopt.chamber.layout.sizes import Sizes
 from chamberopt.chamber.layout.target import Surface, propose_target, surfaces
 from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.proposal import Wanted, propose_charge, propose_ranges
+from chamberopt.chamber.propose.proposal import (
+    Wanted,
+    propose_charge,
+    propose_ranges,
+    touched_share,
+)
 from chamberopt.chamber.propose.proposed_mask import find_left_out
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.chamber.shop import StockBalls, usual_shop
@@ -318,6 +324,46 @@ def test_legs_outside_of_the_walls_hang_beside_the_sonotrode_or_stay_above_it(
     else:
         assert distances[0] == pytest.approx(distances[1], abs=2e-3)  # of a higher part
         assert lowest < -0.05
+
+
+def _fillet(middle: tuple[float, float], radius: float) -> list[tuple[float, float]]:
+    """Corners of a hollow quarter round, from its right to its lower end."""
+    angle = np.linspace(np.pi, 1.5 * np.pi, 9)
+    x, y = middle
+    return [(x + radius * np.cos(one), y + radius * np.sin(one)) for one in angle]
+
+
+def test_a_flange_is_the_lid_of_a_round_chamber_for_its_fillet(tmp_path: Path) -> None:
+    """A hub of 50 mm on a flange of 124 mm, which needs four sonotrodes, takes one of 80 mm."""
+    fillet = _fillet((0.030, 0.015), 0.005)
+    profile = [(0, 0), (0.062, 0), (0.062, 0.010), *fillet[::-1], (0.025, 0.06), (0, 0.06)]
+    trimesh.creation.revolve(profile, sections=64).export(tmp_path / "flange.stl")
+    made = propose(tmp_path / "flange.stl", Wanted(unit="m", ball_mm=2.0), lambda _: [])
+    chamber = made.tables["chamber"]
+    assert made.tables["part.target"]["faces"][0]["fillet"]
+    assert (chamber["shape"], chamber["diameter_mm"]) == ("cylinder", 80.0)
+    assert (made.sonotrode_count, made.closed) == (1, ("z",))
+    assert made.tables["holder"]["kind"] == "bore"
+    assert touched_share(made) > 0.99
+    assert not made.jams
+    level = made.chamber.vertices[:, 2].max() - made.design.chamber.sonotrode_distance
+    assert level == pytest.approx(0.05, abs=1e-5)  # the flange's own face
+
+
+def test_the_weld_of_a_plate_is_peened_on_fewer_sonotrodes_than_the_plate(tmp_path: Path) -> None:
+    """The web of a T of 120 mm hangs from its plate, which is the lid of a narrow box."""
+    right = _fillet((0.007, 0.010), 0.002)
+    left = [(-x, y) for x, y in right]
+    outline = [(-0.045, 0), (0.045, 0), (0.045, 0.008), *right[::-1], (0.005, 0.06)]
+    outline += [(-0.005, 0.06), *left, (-0.045, 0.008)]
+    mesh = Manifold.extrude(CrossSection([1e3 * np.array(outline)]), 120.0).to_mesh()
+    body = trimesh.Trimesh(1e-3 * mesh.vert_properties, mesh.tri_verts)
+    body.export(tmp_path / "joint.stl")
+    made = propose(tmp_path / "joint.stl", Wanted(unit="m"), lambda _: [])
+    assert made.tables["chamber"]["shape"] == "box"
+    assert made.sonotrode_count == 2
+    assert "z" in made.closed
+    assert made.design.shot.diameter <= 1e-3
 
 
 def test_faces_do_not_take_a_name_of_the_file() -> None:

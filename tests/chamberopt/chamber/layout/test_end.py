@@ -79,6 +79,25 @@ def test_webs_close_a_chamber_where_the_target_ends(apart: float) -> None:
     assert room.sizes.height - room.sizes.distance == pytest.approx(sizes.height - sizes.distance)
 
 
+def test_a_web_is_the_lid_of_a_round_chamber_whose_sides_stay_open() -> None:
+    """The lower web, 6 mm thick, hangs in the room: it is the lowest there."""
+    mesh, body = part_of(crank(20.0))
+    pin = np.linalg.norm(body.triangles_center[:, :2], axis=1) < 8.01
+    pin &= np.abs(body.face_normals[:, 2]) < 0.1
+    posed = mesh.vertices + np.array([5e-3, 0.0, 16e-3])
+    around = posed[np.unique(mesh.triangles[pin])]
+    sizes = propose_sizes(posed, 26e-3, 1e-3, "cylinder", 1.0, around)
+    room = local_room(posed, mesh.triangles, pin, sizes, None)
+    assert room.sizes.closed == ("z",)
+    assert room.sizes.plan == sizes.plan
+    assert room.lowest == pytest.approx(0.0)
+    assert 1e3 * room.middle(room.sizes) == pytest.approx([5.0, 0.0])
+    wide = replace(room.sizes, plan={"diameter_mm": 50.0})
+    outline = 1e3 * room.plan(wide) - [5.0, 0.0]
+    assert np.linalg.norm(outline, axis=1) == pytest.approx(25.0)
+    assert 1e3 * (room.sizes.height - room.sizes.distance) == pytest.approx(26.5)
+
+
 def test_small_or_far_faces_close_no_chamber() -> None:
     for web, far in ((60.0, 0.0), (17.0, 0.0), (60.0, 5.0)):
         mesh, body = part_of(crank(20.0, web))
