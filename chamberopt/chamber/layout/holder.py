@@ -51,6 +51,7 @@ WIDER, SHORTEST, LONGEST = 2.0, 0.25, 0.4
 # An end narrows if its outer TIP, a share of the grip, is slimmer than STRAIGHT of the whole grip.
 TIP, STRAIGHT = 0.1, 0.8
 PINS = "expanding pins, drawn from behind, in its"
+NOT_FIXED = "NO HOLE TAKES A SCREW: say what holds it to the face, such as adhesive or a magnet"
 POTTED = "NO STRAIGHT END TO CLAMP: give jaws its form, or cast it into the block with polyurethane"
 # Thickness of a collar's or block's walls round an end: a share of its width, within [m], and where
 # there is no room for that, as thick as jaws with screws may be, and as a cap that is drilled.
@@ -243,7 +244,8 @@ def _on_flat_faces(
         for made in (_around_end(seen), on_face):
             if made is not None:
                 bolts = [] if made.is_round_an_end else _bolts(seen, made, holes)
-                reason = f"{made.reason}{_in_words(bolts)}"
+                fixed = _in_words(bolts) if made.is_round_an_end or bolts else f"; {NOT_FIXED}"
+                reason = f"{made.reason}{fixed}"
                 pins = tuple(one.wall for one in bolts if one.is_in_target)
                 choice = made.with_keys(at)._replace(reason=reason, pins=pins)
                 if made.is_round_an_end:

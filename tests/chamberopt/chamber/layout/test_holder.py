@@ -8,8 +8,9 @@ import pytest
 import trimesh
 from manifold3d import CrossSection, Manifold, OpType
 
+from chamberopt.chamber.layout.arbor import find_bores
 from chamberopt.chamber.layout.end import bare_end, held_end
-from chamberopt.chamber.layout.holder import HolderChoice, end_holder, holder_choices
+from chamberopt.chamber.layout.holder import NOT_FIXED, HolderChoice, end_holder, holder_choices
 from chamberopt.chamber.layout.target import WHOLE, Surface, Target, apart
 from chamberopt.chamber.propose import first_design
 from chamberopt.chamber.propose.first_design import propose
@@ -41,6 +42,25 @@ def test_a_plate_is_held_by_a_rod_opposite_to_its_target() -> None:
     assert first.keys["at"]["faces"][0]["at_mm"][2] == pytest.approx(2.5)
     assert "axis" not in first.keys  # to the ceiling
     assert "looks up" in first.reason
+    assert NOT_FIXED in first.reason
+
+
+def test_bolts_through_a_hole_hold_a_rod_without_further_words() -> None:
+    plate = Manifold.cube((60, 41, 5)).translate([-30, -20.5, -2.5])
+    hole = Manifold.cylinder(10, 3, circular_segments=48).translate([8, 4, -5])
+    body = solid(plate - hole)
+    mesh = PartMesh(
+        1e-3 * body.vertices,
+        body.faces.astype(np.int32),
+        number_by_position(len(body.faces)),
+        (),
+        "",
+    )
+    down = body.face_normals[:, 2] < -0.5
+    bores = find_bores(mesh, down, for_arbor=False)
+    reason = holder_choices(mesh, down, (0.0, 0.0, 0.0), BALL, bores)[0].reason
+    assert "hole of 6 mm hold" in reason
+    assert NOT_FIXED not in reason
 
 
 def test_a_target_on_top_leaves_the_sides() -> None:
