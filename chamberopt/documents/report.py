@@ -151,13 +151,21 @@ def notes_of(result: Result) -> list[str]:
     return [*(result.study.notes if result.study else ()), *result.notes]
 
 
-def limits_of_intervals(result: Result) -> str:
-    """Return a sentence on errors that the intervals of a result do not cover."""
+def limits_of_intervals(result: Result, has_groups: bool = False) -> str:
+    """Return a sentence on errors that the intervals of a result do not cover.
+
+    Args:
+        has_groups: true where another sentence says what is not calibrated.
+    """
     calibrated, ranges = result.design.calibration is not None, result.record.ranges
     if ranges is None:
         return LIMITS_OF_CALIBRATED if calibrated else LIMITS_OF_INTERVALS
     text = LIMITS_OF_CALIBRATED if calibrated else COUNTED_ONLY
-    return f"{text} The ranges hold what is not calibrated: {groups_text(ranges)}."
+    return (
+        text
+        if has_groups
+        else f"{text} The ranges hold what is not calibrated: {groups_text(ranges)}."
+    )
 
 
 def _subtitle(result: Result) -> str:

@@ -385,7 +385,8 @@ def _limited(result: Result, name: str, text: str) -> str:
 
 def _chamber(result: Result, built: AsBuilt) -> Iterator[Row]:
     table = result.design.chamber.model_dump(mode="json", exclude_none=True)
-    yield "shape", PurePath(table.pop("shape")).name
+    wall = result.design.materials.wall.alloy
+    yield "shape", PurePath(table.pop("shape")).name + (f", walls of {wall}" if wall else "")
     for key in ("sonotrode_distance_mm", "facets", "mesh", "unit"):
         table.pop(key, None)
     counted = {key: table.pop(key, ()) for key in ("holes", "deflectors")}
@@ -535,7 +536,8 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     if face is not None:
         alike = ", driven alike: simulated as one face" if face.count > 1 else ""
         yield "stands on", f"{face.in_words}{alike}"
-    yield "face in the chamber", _size(face_mm)
+    metal = design.materials.sonotrode.alloy
+    yield "face in the chamber", _size(face_mm) + (f", {metal}" if metal else "")
     if limits := slit_limits(result):
         sides = [
             f"{in_words(key)} {plain(low)} mm and a slit at both sides, at most {plain(high)} mm"
@@ -624,8 +626,11 @@ def _expected(result: Result, usual: WantedIntensity | None) -> Iterator[Row]:
         yield "", f"{reason[0].upper()}{reason[1:]}."
     for one in answer_lines(result, load_start(result)):
         if one.about in ("best", "calibration", "ranges"):  # zones have their own block
-            yield "", one.text
-    yield "", f"± 95 % intervals. {limits_of_intervals(result)}"
+            first, over, rest = one.text.partition(" Over their ranges")
+            yield "", first
+            if rest:  # a row of its own: a long one is cut
+                yield "", f"{over.strip()}{rest}"
+    yield "", f"± 95 % intervals. {limits_of_intervals(result, has_groups=True)}"
 
 
 def _expected_figures(result: Result) -> list[Figure]:

@@ -298,9 +298,9 @@ def larger_instead(
         if weak and ratio <= 1.0:
             reason = (
                 f"{LARGER}: {kept} and cover it no later by "
-                f"pilots than {here.in_words}, which are too weak; but {1.0 - other.served:.0%} of "
-                "it lies in fillets of less than 2 or slots of less than 4 of their diameters, for "
-                f"which practice takes smaller ones (--ball-mm {here.ball_mm:g} takes these)"
+                f"pilots than {here.in_words}, which are too weak; {1.0 - other.served:.0%} of the "
+                "target lies in fillets of less than 2 or slots of less than 4 of their diameters, "
+                f"for which practice takes smaller ones (--ball-mm {here.ball_mm:g} takes these)"
             )
         elif (
             count > MANY

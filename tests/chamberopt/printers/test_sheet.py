@@ -90,7 +90,7 @@ def test_its_figures_are_those_of_the_report(folder: Path) -> None:
     assert "Almen intensity in mmA takes a calibration" in expected[""]
     assert rows["Part and pose"]["sonotrode to lowest point"] == "15 mm"
     assert rows["Sonotrode"]["amplitude"] == "25 µm zero-to-peak = 50 µm peak to valley"
-    assert rows["Sonotrode"]["face in the chamber"] == "Ø 50 mm"
+    assert rows["Sonotrode"]["face in the chamber"] == "Ø 50 mm, Ti-6Al-4V"
     assert rows["Shot"]["balls"] == "30 of Ø 3 mm"
     assert rows["Chamber"]["diameter"] == "50 mm"
     assert rows["Made with"]["part, sha256"] == load_result(folder).record.part_sha256
