@@ -104,28 +104,34 @@ class Asked(NamedTuple):
 
     Attributes:
         coverage_percent: wanted coverage; 200 is twice the time to 98 %.
-        strength_dents: dents in the median window that the peening strength takes, if it counts.
+        strength_dents: dents in the median window that the peening strength takes; 0 if that is not
+            known.
+        is_wish: an intensity is asked for: windows are wider, if its strength takes that.
         in_search: strength counts in the search too, as a study limits it.
     """
 
     coverage_percent: float | None = None
     strength_dents: float = 0.0
+    is_wish: bool = True
     in_search: bool = False
 
 
 def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
     """Return the budget with which single places of the target are probably resolved."""
-    coverage_percent, strength_dents, in_search = asked or Asked()
+    coverage_percent, strength_dents, is_wish, in_search = asked or Asked()
     times = (coverage_percent or 100.0) / 100.0
     longer = LAGGING * found.time_to_98
     if found.places:  # and what the pilot is not sure of
         longer = max(MORE * found.time_to_98, found.time_to_98 + found.spread)
     treatment = settable(times * longer)
-    needed = max(MARGIN * DENTS, found.dents_for_mean * treatment, strength_dents)
+    for_coverage = max(MARGIN * DENTS, found.dents_for_mean * treatment)
+    needed = max(for_coverage, strength_dents)
     enough = needed / (REPLICAS * found.dent_rate * USUAL_GAUGE)
     most = COLLISIONS / (REPLICAS * found.collision_rate)
     time = _rounded_up(min(max(enough, LEAST_TIME), max(most, LEAST_TIME), MOST_TIME))
     dents = REPLICAS * found.dent_rate * USUAL_GAUGE * time
+    if not is_wish:
+        needed = max(for_coverage, min(needed, dents))
     widest = max(1.0, WIDEST * found.target / USUAL_GAUGE)
     gauge = min(_rounded_up(max(1.0, needed / dents)), float(f"{widest:.2g}"))
     expected = (
@@ -153,7 +159,9 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
 def measured_budget(made: Proposal, found: Measured) -> Budget:
     """Return the budget of a proposal that follows from a pilot."""
     is_limited = not made.design.why_no_intensity
-    asked = Asked(made.design.process.coverage_percent, made.strength_dents, is_limited)
+    process = made.design.process
+    is_wish = process.intensity_mmA is not None
+    asked = Asked(process.coverage_percent, made.strength_dents, is_wish, is_limited)
     return propose_budget(found, asked)
 
 

@@ -396,7 +396,6 @@ def as_no_wish(made: Proposal) -> Proposal:
         tables={**made.tables, "process": process},
         reasons=reasons,
         design=made.design.changed({"process.intensity_mmA": None}),
-        strength_dents=0.0,
     )
 
 

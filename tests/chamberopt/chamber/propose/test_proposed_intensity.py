@@ -299,9 +299,8 @@ def test_the_time_is_the_wanted_multiple_of_that_to_98(
 def test_a_wanted_intensity_is_simulated_until_its_strength_is_resolved() -> None:
     """2,000 dents a window, in windows of 1 mm² where 1 dent falls in a second of all replicas."""
     found = Measured(1e6, 1e3, 1000.0, True, 10.0, False, 0.0, 1e-3, 4.0, 900.0)
-    bare, strong, limited = (
-        propose_budget(found, one) for one in (None, Asked(None, 2e3), Asked(None, 2e3, True))
-    )
+    asked = None, Asked(None, 2e3), Asked(None, 2e3, in_search=True)
+    bare, strong, limited = (propose_budget(found, one) for one in asked)
     dents = [10.0 * one.time * one.gauge_mm2 for one in (bare, strong, limited)]
     assert 32.5 <= dents[0] < 100.0
     assert dents[1] >= 2e3
@@ -309,6 +308,12 @@ def test_a_wanted_intensity_is_simulated_until_its_strength_is_resolved() -> Non
     assert bare.search_time == pytest.approx(50.0, rel=0.01)  # twice the 25 that a time takes
     assert strong.search_time == pytest.approx(50.0 / strong.gauge_mm2, rel=0.01)
     assert limited.search_time == pytest.approx(2e3 / limited.gauge_mm2, rel=0.01)
+    # Nobody asked for it: the longest time, as it may be resolved then, and windows of 1 mm².
+    no_wish = propose_budget(found._replace(collision_rate=1e4), Asked(None, 2e3, is_wish=False))
+    assert 10.0 * no_wish.time == pytest.approx(2e7 / 1e4)
+    few = propose_budget(found._replace(collision_rate=1e6), Asked(None, 2e3, is_wish=False))
+    assert (10.0 * few.time, few.gauge_mm2) == (pytest.approx(20.0), 2.0)
+    assert "TOO FEW" not in few.reasons["process.accuracy.simulated_time_s"]
 
 
 def test_a_wanted_intensity_that_is_no_range_is_named() -> None:
@@ -451,7 +456,7 @@ def test_larger_balls_are_taken_that_give_the_intensity_and_are_no_slower(
     assert taken.made.design == larger.design
     reason = taken.made.reasons["shot.diameter_mm"]
     assert reason.startswith("LARGER BALLS FOR THE INTENSITY: they touch 100% of the target")
-    assert "than 1 mm at 40 µm, which are too weak; but 0% of it lies in fillets" in reason
+    assert "than 1 mm at 40 µm, which are too weak; 0% of the target lies in fillets" in reason
     strong = pilot_of(0.12, 100.0)
     for other in (
         Compared(larger, pilot_of(0.12, 700.0)),  # later
