@@ -86,7 +86,11 @@ def teeth_of(vertices: np.ndarray, triangles: np.ndarray) -> int:
 
 
 def find_fillets(
-    faces: Faces, vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray
+    faces: Faces,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    normals: np.ndarray,
+    least_bend: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers of the faces that are fillets, and the curvature of each [1/m], both (k,).
 
@@ -94,6 +98,7 @@ def find_fillets(
         faces: of the surface, as its CAD file has them or as its curvature parts them.
         vertices, triangles: of the surface [m], (n, 3) and (m, 3).
         normals: at the corners of each triangle, (m, 3, 3).
+        least_bend: least angle by which a fillet turns over its mean width [rad].
     """
     hollow = _hollow_curvature(vertices, triangles, normals)
     corner = np.arange(triangles.size).reshape(-1, 3)
@@ -110,7 +115,8 @@ def find_fillets(
     )
     likely = np.flatnonzero((goes_on >= SMOOTH_BORDER * border) & (border > 0.0))
     bent = np.array([np.median(hollow[faces.of_triangle == k]) for k in likely])
-    found = bent > least_curvature(vertices)
+    width = 2.0 * faces.area[likely] / border[likely]
+    found = (bent > least_curvature(vertices)) & (bent * width > least_bend)
     return likely[found], bent[found]
 
 

@@ -20,8 +20,14 @@ from chamberopt.geometry.smoothing.part import Rule, has_points_in_facets, kept,
 from chamberopt.geometry.smoothing.rounds import find_edges
 from chamberopt.geometry.smoothing.smooth import find_surfaces
 from chamberopt.geometry.solids import simplify_planes
-from chamberopt.geometry.triangles import connected_pieces, side_pairs
+from chamberopt.geometry.triangles import areas, connected_pieces, side_pairs
 
+# Curvature of a face beside its fillets over theirs, from which on these are patches of a hollow
+# face, such as of a bore in the mesh of a grid.
+BESIDE, CREASE_DEG = 0.25, 30.0
+# A fillet turns by so much over its mean width. Patches of a bore in a grid's mesh turn by 15 to 30
+# degrees, and the fillets of five parts by 44 and more.
+LEAST_BEND = np.radians(35.0)
 ALIKE = 1.5  # largest ratio of the curvatures of neighbours in one fillet
 LEAST = 0.01  # share of the area of all fillets, below which a round is none, as where two meet
 LEAST_TURN = np.radians(1.0)  # of facets that make a round
@@ -90,13 +96,36 @@ def _fillets_of_facets(mesh: PartMesh) -> FilletNumbers:
     goes_on = bends[one] & bends[two] & (curvature.max(axis=0) < ALIKE * curvature.min(axis=0))
     piece = connected_pieces(one[goes_on], two[goes_on], len(triangles))[1]
     faces = Faces(vertices, triangles, np.where(bends, piece, -1))
-    number, bent = find_fillets(faces, vertices, triangles, found.normals)
+    number, bent = find_fillets(faces, vertices, triangles, found.normals, LEAST_BEND)
+    own_bend = _bend_beside(vertices, triangles, np.isin(faces.of_triangle, number))
+    first = np.unique(faces.of_triangle, return_index=True)[1][number]
+    is_own = own_bend[first] < BESIDE * bent
+    number, bent = number[is_own], bent[is_own]
     area = faces.area[number]
     is_large = area >= LEAST * area.sum()
     made = _numbered(faces.of_triangle, number[is_large], bent[is_large])
     of_facet = np.full(int(facet.max()) + 1, -1)
     of_facet[own] = made.of_triangle
     return FilletNumbers(of_facet[facet], made.curvature)
+
+
+def _bend_beside(vertices: np.ndarray, triangles: np.ndarray, likely: np.ndarray) -> np.ndarray:
+    """Return how hollow the face round each triangle is beside supposed fillets [1/m], (m,).
+
+    It is the sum of all turns of the face times their lengths, over its area.
+
+    Args:
+        likely: marks the triangles of what may be fillets, (m,).
+    """
+    edges, faces = find_edges(vertices, triangles), Faces(vertices, triangles, CREASE_DEG)
+    of = faces.of_triangle
+    inside = (of[edges.triangles[:, 0]] == of[edges.triangles[:, 1]]) & ~likely[
+        edges.triangles
+    ].any(axis=1)
+    turned = np.where(inside, -edges.turn * edges.length, 0.0)
+    area = np.bincount(of, np.where(likely, 0.0, areas(vertices, triangles)), faces.count)
+    bend = np.bincount(of[edges.triangles[:, 0]], turned, faces.count) / np.maximum(area, 1e-30)
+    return np.asarray(bend[of])
 
 
 def _numbered(face: np.ndarray, fillets: np.ndarray, curvature: np.ndarray) -> FilletNumbers:

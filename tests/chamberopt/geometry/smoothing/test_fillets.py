@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import Manifold
 
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.meshes.part_mesh import PartMesh
@@ -85,6 +86,18 @@ def test_the_cut_of_the_facets_does_not_count(change: str) -> None:
 )  # fmt: skip
 def test_what_is_no_fillet(solid: Solid) -> None:
     assert not len(fillets_of(part(solid.strips(np.radians(15.0)))).curvature)
+
+
+@pytest.mark.parametrize("edge", [1.2, 1.7, 2.3])
+def test_the_bore_of_a_grids_mesh_is_none(edge: float) -> None:
+    """Its triangles are irregular and its ends ragged, as those of a scan are."""
+
+    def depth(x: float, y: float, z: float) -> float:
+        return -max(abs(np.hypot(y, z) - 14.0) - 3.0, abs(x) - 20.0)
+
+    mesh = Manifold.level_set(depth, (-25, -20, -20, 25, 20, 20), edge, 0.0).to_mesh()
+    solid = 1e-3 * mesh.vert_properties.astype(float), np.asarray(mesh.tri_verts)
+    assert not len(fillets_of(part(solid)).curvature)
 
 
 def test_a_place_beside_a_fillet_is_refused() -> None:
