@@ -43,6 +43,7 @@ LEVEL_DEG = 0.5  # a flat face is level if it is tilted by less
 # Steps of the turn that brings the long side to x, and the share by which the rectangle round the
 # part may be larger than the smallest one. Simple turns are taken first.
 SQUARE_STEPS = ((90.0, 0.05), (45.0, 0.05), (15.0, 0.01), (5.0, 0.01), (1.0, 0.01))
+NEAR_SQUARE = 0.6  # cosine to an axis of the file from which on a tilted target may as well face it
 NEARLY_SQUARE = 1.01  # length over width up to which a rectangle has no long side
 
 
@@ -112,6 +113,18 @@ def pose_by_size(
     weight, normal = _weighted_normals(vertices, triangles, target)
     sign = 1.0 if float(weight @ normal[:, axis]) > SIDED else -1.0
     return turns_down(sign * np.eye(3)[axis])
+
+
+def square_poses(turns: Turns) -> list[Turns]:
+    """Return the poses near a tilted one in which an axis of the file is down, the nearest first.
+
+    There are none if an axis is down already.
+    """
+    down = _down(turns)
+    axes = sorted((*np.eye(3), *-np.eye(3)), key=lambda axis: -float(axis @ down))
+    if axes[0] @ down > FLAT:
+        return []
+    return [turns_down(axis) for axis in axes if axis @ down > NEAR_SQUARE]
 
 
 def _weighted_normals(

@@ -26,6 +26,7 @@ from chamberopt.chamber.layout.pose import (
     pose_by_size,
     pose_in_words,
     propose_pose,
+    square_poses,
 )
 from chamberopt.chamber.layout.shot_material import choose_shot, hardness_in_words
 from chamberopt.chamber.layout.target import (
@@ -90,6 +91,7 @@ TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
 START = "NOT MEASURED by a pilot, a start"
 FEWER = "so that a strip of it takes few sonotrodes"
 NOT_THIN = "so that it is held by an end of thicker metal"
+ASLANT = "the target faces the sonotrode aslant, so that the part itself is held firmly"
 ON_END = "on end, as no single sonotrode is large enough for it lying"
 Chooser = Callable[[Sequence[Surface]], Sequence[str]]
 
@@ -138,6 +140,12 @@ def propose(path: Path, wanted: Wanted, choose: Chooser) -> Proposal:
         return _held_otherwise(given, target, made)
     if end is not None and "holder" not in made.tables:  # nothing holds the end: it is peened too
         return _proposed(given, stance)
+    if wanted.pose is None and end is None and not is_firm(made):
+        for turns in square_poses(stance.turns):
+            with suppress(InputError):
+                other = _proposed(given, Stance(target, turns, ASLANT))
+                if is_firm(other) and _is_no_worse(other, made):
+                    return other
     if keeps_target or wanted.pose or end is not None or not hangs_by_a_face(made):
         return made
     end = held_end(mesh, target, made.design.part.rotate_deg, of_any=True)
@@ -147,6 +155,15 @@ def propose(path: Path, wanted: Wanted, choose: Chooser) -> Proposal:
             if "holder" in other.tables and faults(other) <= faults(made):
                 return other
     return made
+
+
+def _is_no_worse(other: Proposal, made: Proposal) -> bool:
+    """Return whether a proposal has no more faults and sonotrodes, and touches as much."""
+    return (
+        faults(other) <= faults(made)
+        and other.sonotrode_count <= made.sonotrode_count
+        and touched_share(other) >= touched_share(made) - LEAST_TOUCHED
+    )
 
 
 def propose_alike(like: Proposal, path: Path, wanted: Wanted, choose: Chooser) -> Proposal:

@@ -18,6 +18,7 @@ from chamberopt.chamber.layout.sizes import Sizes
 from chamberopt.chamber.layout.target import Surface, propose_target, surfaces
 from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.held_proposal import is_firm
 from chamberopt.chamber.propose.proposal import (
     Wanted,
     propose_charge,
@@ -364,6 +365,22 @@ def test_the_weld_of_a_plate_is_peened_on_fewer_sonotrodes_than_the_plate(tmp_pa
     assert made.sonotrode_count == 2
     assert "z" in made.closed
     assert made.design.shot.diameter <= 1e-3
+
+
+def test_a_fillet_that_looks_aslant_leaves_the_part_square_where_that_holds_it(
+    tmp_path: Path,
+) -> None:
+    """An angle of 60 x 120 mm whose fillet looks at 45 degrees: tilted, nothing clamps it."""
+    fillet = _fillet((0.011, 0.011), 0.004)
+    outline = [(0, 0), (0.06, 0), (0.06, 0.007), *fillet[::-1], (0.007, 0.12), (0, 0.12)]
+    mesh = Manifold.extrude(CrossSection([1e3 * np.array(outline)]), 40.0).to_mesh()
+    body = trimesh.Trimesh(1e-3 * mesh.vert_properties, mesh.tri_verts)
+    body.export(tmp_path / "angle.stl")
+    made = propose(tmp_path / "angle.stl", Wanted(unit="m"), lambda _: [])
+    assert made.tables["part.target"]["faces"][0]["fillet"]
+    assert not np.remainder(made.design.part.rotate_deg, 90.0).any()
+    assert is_firm(made)
+    assert touched_share(made) > 0.99
 
 
 def test_faces_do_not_take_a_name_of_the_file() -> None:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.chamber.layout.pose import pose_in_words, propose_pose
+from chamberopt.chamber.layout.pose import pose_in_words, propose_pose, square_poses
+from chamberopt.geometry.triangles import rotation_matrix
 from tests.chamberopt.chamber.layout.test_arbor import drum, part_of
 
 
@@ -33,3 +34,14 @@ def test_a_turn_about_the_vertical_is_told_with_its_way(turn: float) -> None:
     words = pose_in_words(mesh, [], (0.0, 0.0, turn))
     assert f"turned by {abs(turn):g} degrees about the vertical" in words
     assert words.endswith(", clockwise as seen from above") == (turn < 0.0)
+
+
+def test_square_poses_are_those_near_a_tilted_one() -> None:
+    assert square_poses((0.0, 0.0, 30.0)) == square_poses((90.0, 0.0, 0.0)) == []
+    for turns, count in (((0.0, 30.0, 0.0), 1), ((0.0, 45.0, 0.0), 2), ((35.3, 45.0, 0.0), 1)):
+        found = square_poses(turns)
+        assert len(found) == count
+        for one in found:
+            assert not np.remainder(one, 90.0).any()
+            cosine = rotation_matrix(one)[2] @ rotation_matrix(turns)[2]
+            assert cosine > 0.6
