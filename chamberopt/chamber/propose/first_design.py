@@ -116,6 +116,7 @@ def propose(path: Path, wanted: Wanted, choose: Chooser) -> Proposal:
     choose_shot(wanted.shot, alloy(wanted.alloy or USUAL_PART).name, wanted.shop or usual_shop())
     with step("reading the part"):
         mesh = _read(path, wanted.unit)
+    with step("finding faces and fillets"):
         known = surfaces(mesh)
     asked = choose(known)
     target = propose_target(mesh, known, asked)

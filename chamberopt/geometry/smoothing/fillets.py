@@ -31,6 +31,7 @@ LEAST_BEND = np.radians(35.0)
 ALIKE = 1.5  # largest ratio of the curvatures of neighbours in one fillet
 LEAST = 0.01  # share of the area of all fillets, below which a round is none, as where two meet
 LEAST_TURN = np.radians(1.0)  # of facets that make a round
+MOST_TRIANGLES = 100_000  # of a scan, which takes minutes and has no fillets that are like all over
 MOST_PARTS = 4  # whose fillets are kept in memory
 
 
@@ -61,7 +62,10 @@ def face_at(mesh: PartMesh, faces: Faces, border: Border, place: np.ndarray) -> 
     """
     face, away = faces.at(place)
     if border == "fillet" and (fillets_of(mesh).of_triangle[faces.of_triangle == face] < 0).any():
-        raise InputError("the surface is no fillet there; take a crease_deg in its place")
+        many = f", or has over {MOST_TRIANGLES:,} triangles" * (
+            len(mesh.triangles) > MOST_TRIANGLES
+        )
+        raise InputError(f"the surface is no fillet there{many}; take a crease_deg in its place")
     return face, away
 
 
@@ -72,6 +76,8 @@ def fillets_of(mesh: PartMesh) -> FilletNumbers:
         faces = mesh.faces(None)
         found = find_fillets(faces, mesh.vertices, mesh.triangles, mesh.normals)
         return _numbered(faces.of_triangle, *found)
+    if len(mesh.triangles) > MOST_TRIANGLES:
+        return FilletNumbers(np.full(len(mesh.triangles), -1), np.zeros(0))
     key = key_of(["fillets", mesh.vertices, mesh.triangles, mesh.normals])
     return kept(FilletNumbers, (), key, lambda: _fillets_of_facets(mesh))
 
@@ -119,12 +125,11 @@ def _bend_beside(vertices: np.ndarray, triangles: np.ndarray, likely: np.ndarray
     """
     edges, faces = find_edges(vertices, triangles), Faces(vertices, triangles, CREASE_DEG)
     of = faces.of_triangle
-    inside = (of[edges.triangles[:, 0]] == of[edges.triangles[:, 1]]) & ~likely[
-        edges.triangles
-    ].any(axis=1)
-    turned = np.where(inside, -edges.turn * edges.length, 0.0)
+    one, two = edges.triangles.T
+    counts = (of[one] == of[two]) & ~likely[one] & ~likely[two]
+    turned = np.where(counts, -edges.turn * edges.length, 0.0)
     area = np.bincount(of, np.where(likely, 0.0, areas(vertices, triangles)), faces.count)
-    bend = np.bincount(of[edges.triangles[:, 0]], turned, faces.count) / np.maximum(area, 1e-30)
+    bend = np.bincount(of[one], turned, faces.count) / np.maximum(area, 1e-30)
     return np.asarray(bend[of])
 
 

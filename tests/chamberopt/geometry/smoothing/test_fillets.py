@@ -8,6 +8,7 @@ from manifold3d import Manifold
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
+from chamberopt.geometry.smoothing import fillets
 from chamberopt.geometry.smoothing.fillets import face_at, faces_of, fillets_of
 from chamberopt.geometry.triangles import areas, rotation_matrix
 from tests.chamberopt.geometry.smoothing.test_exact_solids import BALL, BLOCKS, SHAFT, TORUS
@@ -98,6 +99,14 @@ def test_the_bore_of_a_grids_mesh_is_none(edge: float) -> None:
     mesh = Manifold.level_set(depth, (-25, -20, -20, 25, 20, 20), edge, 0.0).to_mesh()
     solid = 1e-3 * mesh.vert_properties.astype(float), np.asarray(mesh.tri_verts)
     assert not len(fillets_of(part(solid)).curvature)
+
+
+def test_of_a_large_scan_none_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fillets, "MOST_TRIANGLES", 10)
+    mesh = part(BLOCKS[3.0].strips(np.radians(15.0)))
+    assert not len(fillets_of(mesh).curvature)
+    with pytest.raises(InputError, match="no fillet there, or has over 10 triangles"):
+        face_at(mesh, faces_of(mesh, "fillet"), "fillet", np.zeros(3))
 
 
 def test_a_place_beside_a_fillet_is_refused() -> None:
