@@ -62,10 +62,9 @@ def face_at(mesh: PartMesh, faces: Faces, border: Border, place: np.ndarray) -> 
     """
     face, away = faces.at(place)
     if border == "fillet" and (fillets_of(mesh).of_triangle[faces.of_triangle == face] < 0).any():
-        many = f", or has over {MOST_TRIANGLES:,} triangles" * (
-            len(mesh.triangles) > MOST_TRIANGLES
-        )
-        raise InputError(f"the surface is no fillet there{many}; take a crease_deg in its place")
+        many = len(mesh.triangles) > MOST_TRIANGLES
+        why = f", or the part has over {MOST_TRIANGLES:,} triangles" if many else ""
+        raise InputError(f"the surface is no fillet there{why}; take a crease_deg in its place")
     return face, away
 
 

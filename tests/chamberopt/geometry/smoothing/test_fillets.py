@@ -105,7 +105,7 @@ def test_of_a_large_scan_none_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(fillets, "MOST_TRIANGLES", 10)
     mesh = part(BLOCKS[3.0].strips(np.radians(15.0)))
     assert not len(fillets_of(mesh).curvature)
-    with pytest.raises(InputError, match="no fillet there, or has over 10 triangles"):
+    with pytest.raises(InputError, match="no fillet there, or the part has over 10 triangles"):
         face_at(mesh, faces_of(mesh, "fillet"), "fillet", np.zeros(3))
 
 
