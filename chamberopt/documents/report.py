@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.checks.check import matters
+from chamberopt.chamber.propose.proposed_budget import OF_TIME, ROUGH
 from chamberopt.common.files import read_file
 from chamberopt.common.number_text import estimate_text, typeset
 from chamberopt.documents.answer import answer, answer_lines
@@ -297,9 +298,24 @@ def _effect_text(name: str, value: object) -> str:
     return "on" if value else "off"
 
 
+def open_matters(result: Result) -> list[str]:
+    """Return what is to be settled with the design, but for a time that the result now knows."""
+    time = result.metrics.get("time_to_98_s")
+    is_known = time is not None and time.half_width <= ROUGH * time.value
+    return [one for one in result.design.to_settle if not (is_known and one.startswith(OF_TIME))]
+
+
+def open_warnings(result: Result) -> list[str]:
+    """Return the warnings of a result, but for matters that it settles itself."""
+    open_ = open_matters(result)
+    left_out = zip(result.design.to_settle, matters(result.design), strict=True)
+    settled = {warning for matter, warning in left_out if matter not in open_}
+    return [one for one in result.record.warnings or () if one not in settled]
+
+
 def _to_settle(result: Result) -> Section | None:
     """Return what is to be settled with the design before its chamber is built, if anything is."""
-    found = map(matter_of, result.design.to_settle)
+    found = map(matter_of, open_matters(result))
     texts = [keys_in_words(f"{one.mark.capitalize()}{one.text}") for one in found]
     return Section("To be settled before it is built", [Items(texts)]) if texts else None
 

@@ -26,7 +26,7 @@ from chamberopt.documents.answer import answer, answer_lines
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.ranges import time_at_slow_end
-from chamberopt.documents.report import limits_of_intervals
+from chamberopt.documents.report import limits_of_intervals, open_matters, open_warnings
 from chamberopt.documents.study import exposed_target
 from chamberopt.documents.tolerances import sheet_rows
 from chamberopt.documents.wanted import intensity_lines, time_lines, wanted_rows
@@ -62,7 +62,7 @@ def alarms(result: Result) -> Iterator[str]:
     shot that had not settled, a time that leaves the target bare or is too short for the wanted
     coverage, and an intensity outside of its range.
     """
-    if count := len(result.design.to_settle):
+    if count := len(open_matters(result)):
         yield (
             f"{count} matter{'s are' if count > 1 else ' is'} to be settled before this is built: "
             "see Warnings."
@@ -205,6 +205,7 @@ class AsBuilt(NamedTuple):
     strip: StripOfTarget | None = None  # if the target is peened a strip at a time
     plugs: Sequence[Plug] = ()  # of the mask
     usual: WantedIntensity | None = None  # Almen intensity of its metal and thickness
+    later: Sequence[Sequence[Opening]] = ()  # openings in each further step
 
 
 def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Document:
@@ -300,7 +301,7 @@ def setting_tables(result: Result, built: AsBuilt) -> list[Table]:
         ("Chamber", _chamber(result, built)),
         ("Sonotrode", _sonotrode(result, built.face_mm)),
         ("Shot", _shot(result)),
-        ("Steps", _steps(result)),
+        ("Steps", _steps(result, built)),
         ("Made with", _identity(result)),
         ("Peening, and what to expect", _expected(result, built.usual)),
     ])  # fmt: skip
@@ -593,11 +594,19 @@ def _weighed_g(shot: ShotTable) -> float:
     return 1e3 * shot.ball_mass * shot.count
 
 
-def _steps(result: Result) -> Iterator[Row]:
-    """Yield a row for each step; the drawing and the other tables are of the first."""
+def _steps(result: Result, built: AsBuilt) -> Iterator[Row]:
+    """Yield a row for each step, and for each of its openings if they are not those of the first.
+
+    The drawing and the other tables are of the first.
+    """
     if result.design.steps:
         yield "", "Drawing and tables are of the first step; the others differ from it:"
     yield from (("", one.text) for one in answer_lines(result) if one.about == "step")
+    first = [f"{_of_opening(one)} at {_place(one)} mm" for one in built.openings]
+    for number, openings in enumerate(built.later, start=2):
+        found = [f"{_of_opening(one)} at {_place(one)} mm" for one in openings]
+        if found != first:
+            yield from _first([(f"opening, step {number}", one) for one in found], "openings")
 
 
 def _expected(result: Result, usual: WantedIntensity | None) -> Iterator[Row]:
@@ -675,7 +684,7 @@ def _warnings(result: Result) -> Iterator[Row]:
         yield "", "The design was not checked, so that its warnings are not known."
     elif not warnings:
         yield "", "There are none."
-    yield from (("", keys_in_words(text)) for text in warnings or ())
+    yield from (("", keys_in_words(text)) for text in open_warnings(result))
 
 
 def _identity(result: Result) -> Iterator[Row]:

@@ -108,6 +108,7 @@ WIDER = 0.1  # mm: a cavity that is wider than its sonotrode by more has its own
 FREE = (-8.0, -8.0), (8.0, 2.0)
 FACE = 2.5  # mm on paper, thickness of the drawn sonotrode
 MOST_OUTSIDE = 15.0  # mm on paper, most of the part that is drawn outside the chamber
+BEYOND = 0.1  # mm on paper that a part goes on at least where it is broken off
 BREAK, WAVE = 0.5, 3.0  # mm, height and length of the waves of a line where the part is broken off
 OFF_AXIS = 0.05  # mm: a section that is farther beside the axis has its place dimensioned
 ROOM, PART, TARGET = "#e8f1f7", "#c9ced3", KINDS["target"].colour
@@ -316,9 +317,13 @@ def _draw_breaks(axes: Axes, view: View, lines: np.ndarray) -> None:
     sides, above = view.outside
     low, high = view.place([view.low, view.high])
     ends = view.place(1e3 * lines)
-    for axis, edge in ((0, low[0] - sides), (0, high[0] + sides), (1, high[1] + above)):
+    for axis, edge, way in (
+        (0, low[0] - sides, -BEYOND),
+        (0, high[0] + sides, BEYOND),
+        (1, high[1] + above, BEYOND),
+    ):
         one, two = ends[:, 0], ends[:, 1]
-        crossing = (one[:, axis] > edge) != (two[:, axis] > edge)
+        crossing = (one[:, axis] > edge + way) != (two[:, axis] > edge + way)
         one, two = one[crossing], two[crossing]
         share = (edge - one[:, axis]) / (two - one)[:, axis]
         places = np.sort((one + share[:, None] * (two - one))[:, 1 - axis])

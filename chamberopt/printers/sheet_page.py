@@ -269,6 +269,7 @@ def write_sheet(
             strip_of_target(design, part),
             plugs_of(design, part),
             usual_for_target(design, part),
+            [find_openings(step) for step in chamber.steps[1:]],
         )
         sheet = process_sheet(loaded, built, revision)
         limits, face = slit_limits(loaded) | chamber_limits(loaded), design.sonotrode.face

@@ -59,6 +59,7 @@ from chamberopt.chamber.propose.proposal import (
     nested,
     touched_share,
 )
+from chamberopt.chamber.propose.proposed_budget import OF_TIME
 from chamberopt.chamber.propose.proposed_clamp import clamped_outside, grips_poorly
 from chamberopt.chamber.propose.proposed_room import (
     AMPLITUDE_UM,
@@ -88,7 +89,7 @@ FEW = 2  # sonotrodes side by side that are better than a room of which the part
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
-START = "NOT MEASURED by a pilot, a start"
+START = f"{OF_TIME[2]}, a start"
 FEWER = "so that a strip of it takes few sonotrodes"
 NOT_THIN = "so that it is held by an end of thicker metal"
 ASLANT = "the target faces the sonotrode aslant, so that the part itself is held firmly"

@@ -39,6 +39,8 @@ SET_TIMES = (
 # Factors on the pilot's time, which is short. Where it resolves no single places, the least covered
 # ones lag behind the target on average: 326 s against 133 s in a joint's chamber.
 MORE, LAGGING = 1.3, 2.0
+# Beginnings of matters to settle that a simulation settles, once it knows the time to 98 %.
+OF_TIME = "TIME KNOWN ROUGHLY", "TIME NOT RESOLVED", "NOT MEASURED by a pilot"
 ROUGH = 0.4  # half-width of a time over the time, from which on that is a matter to settle
 LONG = 1800.0  # s
 UNEVEN = 1.5  # time of single places over that of the target on average, from which on they rule
@@ -229,9 +231,9 @@ def _said_of_treatment(found: Measured, treatment: float, coverage_percent: floa
     long = f"; LONG: {_said_of_long(found)}" if found.time_to_98 > LONG else ""
     if found.places and found.spread > ROUGH * found.time_to_98:
         known = f"to ± {found.spread / found.time_to_98:.0%}"
-        long += f"; TIME KNOWN ROUGHLY, {known}: simulate before it is set"
+        long += f"; {OF_TIME[0]}, {known}: simulate before it is set"
     if not found.places:
-        long += "; TIME NOT RESOLVED for single places: simulate before it is set"
+        long += f"; {OF_TIME[1]} for single places: simulate before it is set"
     wanted = ""
     if coverage_percent is not None:
         times = rounded(coverage_percent / 100.0, 3)

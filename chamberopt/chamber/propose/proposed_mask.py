@@ -353,13 +353,18 @@ def moved_openings(chamber: Chamber) -> str:
     for one in first:
         for other in others:
             if _is_elsewhere(one, near := _nearest(one, other)):
-                before, after = (x and format_point(np.round(x.place, 4)) for x in (one, near))
+                before, after = (x and _in_words(x) for x in (one, near))
                 return (
-                    f"OPENINGS MOVE in the second pose, one from {before} in the "
-                    f"chamber's frame to {after or 'none'}: a second wall or insert, and jaws that "
-                    "suit it"
+                    f"OPENINGS CHANGE in the second pose, one from {before} in the chamber's frame "
+                    f"to {after or 'none'}: a second wall or insert, and jaws that suit it"
                 )
     return ""
+
+
+def _in_words(one: Opening) -> str:
+    """Return the size and place of an opening."""
+    size = " x ".join(f"{1e3 * side:.3g}" for side in one.size)
+    return f"{size} mm at {format_point(np.round(one.place, 4))}"
 
 
 def sharp_edges(vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> float:

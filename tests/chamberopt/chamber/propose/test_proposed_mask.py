@@ -89,12 +89,12 @@ def test_openings_that_move_in_a_second_pose_are_told(monkeypatch: pytest.Monkey
 
     assert told() == told([here, top], [top, here]) == ""
     assert told([here], [up]).startswith(
-        "OPENINGS MOVE in the second pose, one from (30, 0, 15) mm in the chamber's frame to "
-        "(30, 0, 17) mm: a second wall"
+        "OPENINGS CHANGE in the second pose, one from 20 x 10 mm at (30, 0, 15) mm in the "
+        "chamber's frame to 20 x 10 mm at (30, 0, 17) mm: a second wall"
     )
     assert " to none: " in told([here], [top])
     wider = here._replace(size=(0.02, 0.012))
-    assert "OPENINGS MOVE" in told([here], [wider])
+    assert "to 20 x 12 mm at (30, 0, 15) mm" in told([here], [wider])
 
 
 def test_a_bore_out_through_the_ceiling_is_plugged(tmp_path: Path) -> None:
