@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import shot_reach
 from chamberopt.chamber.checks.jams import gaps_in_reach, jam_gaps
 from chamberopt.chamber.checks.warning import WarningKind
@@ -51,6 +51,9 @@ from chamberopt.geometry.triangles import rotation_matrix
 
 WORTH = 2.0 / 3.0  # of the time in one pose, in which a second set-up, often with its own wall, is
 RAISED = 1.0, 2.0, 3.0  # ball diameters by which a ceiling is raised for a second pose
+# Where a second pose lifts the target above the ceiling by at most so much [m], this is raised over
+# it by so many ball diameters. A target that goes out farther is long, and is peened from below.
+MOST_CUT, BELOW = 15e-3, 2.0
 # Level axes about which a part may be turned over, and their angle to the chamber's x [degrees].
 OVER = {"x": 0.0, "y": 90.0, "the diagonal of x and y": 45.0, "the diagonal of x and -y": -45.0}
 # When two sizes pay, by heart: coarse balls serve MOSTLY of the target, their intensity is so many
@@ -165,7 +168,22 @@ def _turned_about(made: Proposal, axis: str) -> Proposal:
     for balls in RAISED:  # under a ceiling that fits one pose, balls may jam in the other
         if _jams_more(two, made):
             two = min(two, _turned_over(made, axis, balls), key=faults)
+    first, second = (_above_the_ceiling(one) for one in two.chamber.steps[:2])
+    ball = made.design.shot.diameter
+    if first <= -BELOW * ball < second <= MOST_CUT:
+        with suppress(InputError):
+            height = round(two.tables["chamber"]["height_mm"] - made.tables["chamber"]["height_mm"])
+            higher = _turned_over(made, axis, (1e-3 * height + second) / ball + BELOW)
+            if faults(higher) <= faults(two):
+                return higher
     return two
+
+
+def _above_the_ceiling(room: Chamber) -> float:
+    """Return how far the target goes out above the ceiling of a chamber [m], below 0 if not."""
+    part = room.part
+    top = float(part.vertices[part.triangles[part.target], 2].max())
+    return top - float(room.vertices[:, 2].max())
 
 
 def _jams_more(made: Proposal, before: Proposal) -> bool:
@@ -185,7 +203,7 @@ def _turned_over(made: Proposal, axis: str, raised: float = 0.0) -> Proposal:
     two = _with_values(made, *_over(made, axis, raised))
     if not raised:
         return two
-    text = "high enough for both poses, so that no ball jams under the ceiling"
+    text = "high enough for both poses"
     reason = f"{made.reasons['chamber.height_mm']}; {text}"
     return replace(two, reasons={**two.reasons, "chamber.height_mm": reason})
 

@@ -26,6 +26,7 @@ from chamberopt.chamber.propose.proposal import (
     touched_share,
 )
 from chamberopt.chamber.propose.proposed_mask import find_left_out
+from chamberopt.chamber.propose.proposed_steps import turned_over
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.chamber.shop import StockBalls, usual_shop
 from chamberopt.common.errors import InputError
@@ -381,6 +382,20 @@ def test_a_fillet_that_looks_aslant_leaves_the_part_square_where_that_holds_it(
     assert not np.remainder(made.design.part.rotate_deg, 90.0).any()
     assert is_firm(made)
     assert touched_share(made) > 0.99
+
+
+def test_a_second_pose_keeps_the_target_below_the_ceiling(tmp_path: Path) -> None:
+    """A shaft with a collar: turned over, its other fillet would come to lie in the ceiling."""
+    low, high = _fillet((0.018, 0.057), 0.003), _fillet((0.0195, 0.087), 0.002)
+    profile = [(0, 0), (0.015, 0), *[(x, 0.114 - y) for x, y in low]]
+    profile += [(0.025, 0.060), (0.025, 0.085), *high[::-1], (0.0175, 0.151), (0, 0.151)]
+    trimesh.creation.revolve(profile, sections=64).export(tmp_path / "shaft.stl")
+    made = propose(tmp_path / "shaft.stl", Wanted(unit="m", ball_mm=1.0), lambda _: [])
+    two = turned_over(made)
+    for step in two.chamber.steps:
+        top = step.part.vertices[step.part.triangles[step.part.target], 2].max()
+        assert step.vertices[:, 2].max() - top > 1.9e-3
+    assert "high enough for both poses" in two.reasons["chamber.height_mm"]
 
 
 def test_faces_do_not_take_a_name_of_the_file() -> None:
