@@ -13,8 +13,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from chamberopt.chamber.checks.fillets import OF_FILLET, OF_SLOT
 from chamberopt.chamber.layout.target import area_in_mm2
 from chamberopt.chamber.propose.first_design import START
@@ -26,7 +24,7 @@ from chamberopt.common.number_text import plain, rounded
 from chamberopt.documents.document import Table
 from chamberopt.geometry.triangles import areas
 from chamberopt.peening.strip import StripSize
-from chamberopt.peening.strip_holder import why_no_strip
+from chamberopt.peening.strip_holder import target_level_mm, why_no_strip
 
 if TYPE_CHECKING:
     from chamberopt.chamber.layout.target import Surface
@@ -241,17 +239,6 @@ def _target(made: Proposal) -> str:
     return made.reasons["part.target"].partition(": ")[0]
 
 
-def _target_level_mm(made: Proposal) -> int:
-    """Return how far from the sonotrode the target lies on the average [mm].
-
-    Farther away a strip saturates later.
-    """
-    part = made.chamber.part
-    height = part.vertices[part.triangles].mean(axis=1)[:, 2]
-    area = np.where(part.target, made.chamber.exposed_area, 0.0)
-    return round(1e3 * float(np.average(height, weights=area)))
-
-
 def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     """Yield name and value of each row, and the keys whose reasons belong to it."""
     tables, design = made.tables, made.design
@@ -289,7 +276,7 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     if INTENSITY in made.reasons:
         value = clauses(made.reasons[INTENSITY])[0][0].partition(": ")[0]
         yield "intensity", value, (INTENSITY,)
-        level = _target_level_mm(made)
+        level = target_level_mm(made.chamber)
         strips = (
             f"in the lid in place of the part, {level} mm from the sonotrode as the middle of the "
             f"target is: chamberopt strip --distance-mm {level}"

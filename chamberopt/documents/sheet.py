@@ -32,6 +32,8 @@ from chamberopt.documents.tolerances import sheet_rows
 from chamberopt.documents.wanted import intensity_lines, time_lines, wanted_rows
 from chamberopt.documents.wording import keys_in_words, metric_label, plain, value_text
 from chamberopt.documents.zones import turned
+from chamberopt.peening.strip import StripSize
+from chamberopt.peening.strip_holder import why_no_strip
 from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
@@ -206,6 +208,7 @@ class AsBuilt(NamedTuple):
     plugs: Sequence[Plug] = ()  # of the mask
     usual: WantedIntensity | None = None  # Almen intensity of its metal and thickness
     later: Sequence[Sequence[Opening]] = ()  # openings in each further step
+    level_mm: int | None = None  # of the target above the sonotrode, where strips are set
 
 
 def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Document:
@@ -219,7 +222,7 @@ def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Documen
     """
     record = result.record
     start = load_start(result)
-    checks, calibrated = first_checks(result), calibrated_to(result)
+    checks, calibrated = first_checks(result, built.level_mm), calibrated_to(result)
     reasons = (
         *alarms(result),
         *_unusual_intensity(result, built.usual),
@@ -697,9 +700,13 @@ def _identity(result: Result) -> Iterator[Row]:
     yield "result, sha256", record.sha256
 
 
-def first_checks(result: Result) -> Table:
-    """Return the quantities to measure before production, each with its expected value."""
-    rows = [(what, expected, "") for what, expected in _checks(result)]
+def first_checks(result: Result, level_mm: int | None = None) -> Table:
+    """Return the quantities to measure before production, each with its expected value.
+
+    Args:
+        level_mm: how far from the sonotrode strips are set, if that is known.
+    """
+    rows = [(what, expected, "") for what, expected in _checks(result, level_mm)]
     return Table("", ("Measure first", "expected", "measured"), rows, numbers=False)
 
 
@@ -708,7 +715,7 @@ def _peak_to_valley(result: Result) -> float:
     return 2.0 * result.design.sonotrode.zero_to_peak_um
 
 
-def _checks(result: Result) -> Iterator[Row]:
+def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
     design, calibration = result.design, result.design.calibration
     wanted = _peak_to_valley(result)
     expected = f"{plain(wanted)} µm peak to valley"
@@ -734,6 +741,8 @@ def _checks(result: Result) -> Iterator[Row]:
     intensity = result.metrics.get("almen_intensity")
     if intensity is None:
         strips = "A strips at 4 or 5 times, for chamberopt calibrate"
+        if level_mm is not None and not why_no_strip(design, StripSize()):
+            strips += f"; in the lid in place of the part, {level_mm} mm from the sonotrode"
         rough = PredictedIntensity.of(result.metrics, calibration)
         known = "not known before: calibrates to mmA"
         if rough is not None:

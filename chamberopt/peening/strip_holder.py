@@ -28,6 +28,7 @@ from chamberopt.design.shapes.straight import Cylinder
 from chamberopt.geometry.triangles import area_vectors
 
 if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
     from chamberopt.peening.strip import StripSize
 
 HOLDER_FILE = "strip_holder.obj"
@@ -66,6 +67,17 @@ def strip_design(
     for of_the_part in ("zones", "tolerances", "holder", "mask"):
         data.pop(of_the_part, None)
     return validate(Design, data)
+
+
+def target_level_mm(chamber: Chamber) -> int:
+    """Return how far from the sonotrode a chamber's target lies on the average [mm].
+
+    A strip is set there: farther away it saturates later.
+    """
+    part = chamber.part
+    height = part.vertices[part.triangles].mean(axis=1)[:, 2]
+    area = np.where(part.target, chamber.exposed_area, 0.0)
+    return round(1e3 * float(np.average(height, weights=area + 1e-30)))
 
 
 def why_no_strip(design: Design, size: StripSize) -> str:

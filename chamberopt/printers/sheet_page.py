@@ -29,6 +29,7 @@ from chamberopt.documents.sheet import (
     process_sheet,
     slit_limits,
 )
+from chamberopt.peening.strip_holder import target_level_mm
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
 from chamberopt.pictures.charts.figure_style import ignore_settings_here
 from chamberopt.pictures.part_drawing import (
@@ -270,6 +271,7 @@ def write_sheet(
             plugs_of(design, part),
             usual_for_target(design, part),
             [find_openings(step) for step in chamber.steps[1:]],
+            target_level_mm(chamber),
         )
         sheet = process_sheet(loaded, built, revision)
         limits, face = slit_limits(loaded) | chamber_limits(loaded), design.sonotrode.face

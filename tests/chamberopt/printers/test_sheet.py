@@ -14,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.checks.check import matters
 from chamberopt.chamber.checks.openings import Opening
 from chamberopt.chamber.checks.strips import StripOfTarget
 from chamberopt.cli import main
@@ -27,6 +28,7 @@ from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.design.sonotrode import Face
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Document, Section, Sentence, Table
+from chamberopt.documents.report import open_matters, open_warnings
 from chamberopt.documents.sheet import (
     REQUALIFY,
     AsBuilt,
@@ -286,6 +288,46 @@ def test_what_to_measure_first_without_a_calibration(folder: Path) -> None:
     few.metrics["mean_coverage"] = Estimate(0.5, math.inf, in_words="not resolved")
     names = {what.split()[0] for what, *_ in first_checks(few).rows}
     assert names == checks.keys() - {"mean"}  # nothing to compare a measurement with
+
+
+def test_strips_are_set_at_the_height_of_the_target(folder: Path) -> None:
+    result = load_result(folder)
+    wide = result.design.changed({"chamber.diameter_mm": 140.0})
+    for design, ends in (
+        (result.design, "for chamberopt calibrate"),  # no strip is flush in its lid
+        (wide, "; in the lid in place of the part, 31 mm from the sonotrode"),
+    ):
+        rows = first_checks(replace(result, design=design), 31).rows
+        assert next(what for what, *_ in rows if what[0] == "A").endswith(ends)
+
+
+@pytest.mark.parametrize(("half_width", "left"), [(50.0, 1), (math.inf, 3)])
+def test_what_the_simulation_has_settled_is_told_no_more(
+    folder: Path, half_width: float, left: int
+) -> None:
+    """A pilot had not known the time to 98 %. A design without a time says nothing of it."""
+    result = load_result(folder)
+    texts = ["TIME KNOWN ROUGHLY, to ± 57%: simulate", "NOT MASKED: ask", "NOT MEASURED by a pilot"]
+    design = result.design.changed({"to_settle": texts})
+    warnings = (*matters(design), "another")
+    record = result.record.model_copy(update={"warnings": warnings})
+    told = replace(result, design=design, record=record)
+    told.metrics["time_to_98_s"] = Estimate(900.0, half_width)
+    assert len(open_matters(told)) == left
+    assert [text for text in alarms(told) if text.startswith(f"{left} matter")]
+    assert len(open_warnings(told)) == left + 1
+    assert open_warnings(told)[-1] == "another"
+
+
+def test_the_openings_of_a_later_step_are_told(folder: Path) -> None:
+    one = Opening("the ceiling", (0.035, 0.035), (0.0, 0.0, 0.103), 0.05, (0.0, 0.0, 1.0), "round")
+    other = one._replace(size=(0.03, 0.03))
+    for later, told in (([other], ["opening, step 2"]), ([one], [])):
+        built = AsBuilt((50.0,), [one], later=[later])
+        tables = {table.caption: table for table in setting_tables(load_result(folder), built)}
+        rows = [(name, text) for name, text in tables["Steps"].rows] if "Steps" in tables else []
+        assert [name for name, _ in rows if name] == told
+        assert all("Ø 30 mm" in text for name, text in rows if name)
 
 
 def test_a_folder_whose_name_is_no_text_has_a_sheet(tmp_path: Path) -> None:
