@@ -384,6 +384,7 @@ def test_a_fillet_that_looks_aslant_leaves_the_part_square_where_that_holds_it(
     assert touched_share(made) > 0.99
 
 
+@pytest.mark.long
 def test_a_second_pose_keeps_the_target_below_the_ceiling(tmp_path: Path) -> None:
     """A shaft with a collar: turned over, its other fillet would come to lie in the ceiling."""
     low, high = _fillet((0.018, 0.057), 0.003), _fillet((0.0195, 0.087), 0.002)

@@ -89,7 +89,10 @@ def test_what_is_no_fillet(solid: Solid) -> None:
     assert not len(fillets_of(part(solid.strips(np.radians(15.0)))).curvature)
 
 
-@pytest.mark.parametrize("edge", [1.2, 1.7, 2.3])
+@pytest.mark.parametrize(
+    "edge",
+    [pytest.param(1.2, marks=pytest.mark.long), 1.7, pytest.param(2.3, marks=pytest.mark.long)],
+)
 def test_the_bore_of_a_grids_mesh_is_none(edge: float) -> None:
     """Its triangles are irregular and its ends ragged, as those of a scan are."""
 
