@@ -220,8 +220,11 @@ def _over_the_face(sizes: Sizes, shop: Shop, stand: Stand) -> Floor:
     def room(sides: Iterable[float]) -> str:
         """Return in words how wide the room must be where its wall goes round the face."""
         wide = " x ".join(f"{one + 2.0 * shop.clearance_mm:g}" for one in sides)
-        gaps = "" if face.count == 1 else " and the gaps between the blocks"
-        return f"BUILD IT {wide} mm wide, as the slit round {name}{gaps} is not simulated"
+        are = "is" if face.count == 1 else "and the gaps between the blocks are"
+        return (
+            f"BUILD IT {wide} mm wide: the slit of {shop.clearance_mm:g} mm on each side of {name} "
+            f"{are} not simulated"
+        )
 
     plan = dict(zip(("length_mm", "width_mm"), face.sides_mm, strict=True))
     if sizes.shape == "cylinder":
