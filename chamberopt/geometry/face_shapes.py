@@ -100,7 +100,8 @@ def find_fillets(
         normals: at the corners of each triangle, (m, 3, 3).
         least_bend: least angle by which a fillet turns over its mean width [rad].
     """
-    hollow = _hollow_curvature(vertices, triangles, normals)
+    most, other = hollow_curvatures(vertices, triangles, normals)
+    hollow = np.where(most + other > 0.0, most, 0.0)  # not inside a coil, which bulges more
     corner = np.arange(triangles.size).reshape(-1, 3)
     after = np.roll(corner, -1, axis=1).reshape(-1)  # of each corner, the next one of its triangle
     one, two = side_pairs(triangles).T  # a side begins at its corner, the other one ends there
@@ -125,13 +126,12 @@ def least_curvature(vertices: np.ndarray) -> float:
     return 1.0 / (WIDE_FILLET * float(np.linalg.norm(np.ptp(vertices, axis=0))))
 
 
-def _hollow_curvature(
+def hollow_curvatures(
     vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray
-) -> np.ndarray:
-    """Return the largest hollow curvature of each triangle [1/m], (m,), from its normals.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how hollow each triangle is from its normals [1/m], most and across that, both (m,).
 
-    It is 0 where the surface bulges more in one direction than it is hollow in the other, as on the
-    inside of a coil.
+    Where it bulges they are negative.
 
     The curvatures along the three sides make up its second fundamental form: S. Rusinkiewicz,
     "Estimating Curvatures and Their Derivatives on Triangle Meshes" (2004).
@@ -149,4 +149,5 @@ def _hollow_curvature(
     form = np.stack([u * u, 2.0 * u * v, v * v], axis=2) / square[..., None]
     value = np.einsum("mki,mki->mk", bend, step) / square
     p, q, r = np.einsum("mij,mj->mi", np.linalg.pinv(form), value).T
-    return np.where(p + r < 0.0, np.hypot(0.5 * (p - r), q) - 0.5 * (p + r), 0.0)
+    half, mean = np.hypot(0.5 * (p - r), q), -0.5 * (p + r)
+    return mean + half, mean - half

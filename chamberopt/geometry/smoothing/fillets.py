@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.face_shapes import find_fillets, least_curvature
+from chamberopt.geometry.face_shapes import find_fillets, hollow_curvatures, least_curvature
 from chamberopt.geometry.faces import Border, Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.smoothing.normals import plane_facets
@@ -25,11 +25,13 @@ from chamberopt.geometry.triangles import areas, connected_pieces, side_pairs
 # Curvature of a face beside its fillets over theirs, from which on these are patches of a hollow
 # face, such as of a bore in the mesh of a grid.
 BESIDE, CREASE_DEG = 0.25, 30.0
+BOWL = 0.25  # of a fillet's curvature: what is as hollow across it is a bowl
 # A fillet turns by so much over its mean width. Patches of a bore in a grid's mesh turn by 15 to 30
 # degrees, and the fillets of five parts by 44 and more.
 LEAST_BEND = np.radians(35.0)
 ALIKE = 1.5  # largest ratio of the curvatures of neighbours in one fillet
 LEAST = 0.01  # share of the area of all fillets, below which a round is none, as where two meet
+LEAST_IN_ALL = 0.005  # share of the part's area: less is a patch of a scan
 LEAST_TURN = np.radians(1.0)  # of facets that make a round
 MOST_TRIANGLES = 100_000  # of a scan, which takes minutes and has no fillets that are like all over
 MOST_PARTS = 4  # whose fillets are kept in memory
@@ -104,10 +106,12 @@ def _fillets_of_facets(mesh: PartMesh) -> FilletNumbers:
     number, bent = find_fillets(faces, vertices, triangles, found.normals, LEAST_BEND)
     own_bend = _bend_beside(vertices, triangles, np.isin(faces.of_triangle, number))
     first = np.unique(faces.of_triangle, return_index=True)[1][number]
-    is_own = own_bend[first] < BESIDE * bent
+    across = hollow_curvatures(vertices, triangles, found.normals)[1]
+    bowl = [np.median(across[faces.of_triangle == k]) for k in number]
+    is_own = (own_bend[first] < BESIDE * bent) & (np.array(bowl) < BOWL * bent)
     number, bent = number[is_own], bent[is_own]
     area = faces.area[number]
-    is_large = area >= LEAST * area.sum()
+    is_large = (area >= LEAST * area.sum()) & (area.sum() > LEAST_IN_ALL * faces.area.sum())
     made = _numbered(faces.of_triangle, number[is_large], bent[is_large])
     of_facet = np.full(int(facet.max()) + 1, -1)
     of_facet[own] = made.of_triangle

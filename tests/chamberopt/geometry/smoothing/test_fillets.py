@@ -104,6 +104,18 @@ def test_the_bore_of_a_grids_mesh_is_none(edge: float) -> None:
     assert not len(fillets_of(part(solid)).curvature)
 
 
+def test_a_bowl_is_none() -> None:
+    """It is hollow both ways, and goes on smoothly over its rounded rim."""
+    low, rim = np.radians(np.linspace(-90, -30, 13)), np.radians(np.linspace(150, 90, 13))
+    bowl = np.column_stack([12.0 * np.cos(low), 12.0 * np.sin(low)])
+    middle = 15.0 * np.array([np.cos(low[-1]), np.sin(low[-1])])
+    edge = middle + 3.0 * np.column_stack([np.cos(rim), np.sin(rim)])
+    profile = np.concatenate([bowl, edge[1:], [[25.0, edge[-1, 1]], [25.0, -20.0], [0.0, -20.0]]])
+    body = trimesh.creation.revolve(1e-3 * profile[::-1], sections=64)
+    assert body.is_watertight
+    assert not len(fillets_of(part((body.vertices, body.faces))).curvature)
+
+
 def test_of_a_large_scan_none_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fillets, "MOST_TRIANGLES", 10)
     mesh = part(BLOCKS[3.0].strips(np.radians(15.0)))
