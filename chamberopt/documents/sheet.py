@@ -605,9 +605,11 @@ def _steps(result: Result, built: AsBuilt) -> Iterator[Row]:
     if result.design.steps:
         yield "", "Drawing and tables are of the first step; the others differ from it:"
     yield from (("", one.text) for one in answer_lines(result) if one.about == "step")
-    first = [f"{_of_opening(one)} at {_place(one)} mm" for one in built.openings]
-    for number, openings in enumerate(built.later, start=2):
-        found = [f"{_of_opening(one)} at {_place(one)} mm" for one in openings]
+    first, *others = (
+        [f"{_of_opening(one)} at {_place(one)} mm" for one in openings]
+        for openings in (built.openings, *built.later)
+    )
+    for number, found in enumerate(others, start=2):
         if found != first:
             yield from _first([(f"opening, step {number}", one) for one in found], "openings")
 
@@ -685,9 +687,10 @@ def _warnings(result: Result) -> Iterator[Row]:
     warnings = result.record.warnings
     if warnings is None:
         yield "", "The design was not checked, so that its warnings are not known."
-    elif not warnings:
+    elif not (left := open_warnings(result)):
         yield "", "There are none."
-    yield from (("", keys_in_words(text)) for text in open_warnings(result))
+    else:
+        yield from (("", keys_in_words(text)) for text in left)
 
 
 def _identity(result: Result) -> Iterator[Row]:

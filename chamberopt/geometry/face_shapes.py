@@ -91,6 +91,7 @@ def find_fillets(
     triangles: np.ndarray,
     normals: np.ndarray,
     least_bend: float = 0.0,
+    bowl: float = 2.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers of the faces that are fillets, and the curvature of each [1/m], both (k,).
 
@@ -99,8 +100,10 @@ def find_fillets(
         vertices, triangles: of the surface [m], (n, 3) and (m, 3).
         normals: at the corners of each triangle, (m, 3, 3).
         least_bend: least angle by which a fillet turns over its mean width [rad].
+        bowl: share of a fillet's curvature from which on what is as hollow across it is a bowl;
+            above 1 nothing is one.
     """
-    most, other = hollow_curvatures(vertices, triangles, normals)
+    most, other = _hollow_curvatures(vertices, triangles, normals)
     hollow = np.where(most + other > 0.0, most, 0.0)  # not inside a coil, which bulges more
     corner = np.arange(triangles.size).reshape(-1, 3)
     after = np.roll(corner, -1, axis=1).reshape(-1)  # of each corner, the next one of its triangle
@@ -115,9 +118,13 @@ def find_fillets(
         for x in (long, smooth)
     )
     likely = np.flatnonzero((goes_on >= SMOOTH_BORDER * border) & (border > 0.0))
-    bent = np.array([np.median(hollow[faces.of_triangle == k]) for k in likely])
+    bent, across = (
+        np.array([np.median(one[faces.of_triangle == k]) for k in likely])
+        for one in (hollow, other)
+    )
     width = 2.0 * faces.area[likely] / border[likely]
     found = (bent > least_curvature(vertices)) & (bent * width > least_bend)
+    found &= across < bowl * bent
     return likely[found], bent[found]
 
 
@@ -126,7 +133,7 @@ def least_curvature(vertices: np.ndarray) -> float:
     return 1.0 / (WIDE_FILLET * float(np.linalg.norm(np.ptp(vertices, axis=0))))
 
 
-def hollow_curvatures(
+def _hollow_curvatures(
     vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return how hollow each triangle is from its normals [1/m], most and across that, both (m,).

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chamberopt.chamber.layout.pose import Turns, turns_down
-from chamberopt.chamber.layout.sizes import Sizes
+from chamberopt.chamber.layout.sizes import Sizes, middle_in_plan
 from chamberopt.chamber.layout.target import Target
 from chamberopt.design.shapes.outlines import area_inside
 from chamberopt.geometry.cut import cut_at_box, facets
@@ -450,8 +450,7 @@ def local_room(
         near[:] = float(posed[:, 0].min()) < walls[0, 0], True
         walls[:, 0] += near * (at_wall - sizes.gap) * np.array([-1.0, 1.0])
     if not is_box:
-        middle = 0.5 * (on_target.min(axis=0) + on_target.max(axis=0))[:2]
-        walls[:, :2] = middle + 0.5 * _lengths(sizes) * np.array([[-1.0], [1.0]])
+        walls[:, :2] = middle_in_plan(on_target) + 0.5 * _lengths(sizes) * np.array([[-1.0], [1.0]])
     closes = np.isfinite(faces)
     walls, kept = np.where(closes, faces, walls)[:, :2], np.array(closes[:, :2])
     kept[:, 0] |= near

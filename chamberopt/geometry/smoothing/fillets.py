@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.face_shapes import find_fillets, hollow_curvatures, least_curvature
+from chamberopt.geometry.face_shapes import find_fillets, least_curvature
 from chamberopt.geometry.faces import Border, Faces
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.smoothing.normals import plane_facets
@@ -103,12 +103,10 @@ def _fillets_of_facets(mesh: PartMesh) -> FilletNumbers:
     goes_on = bends[one] & bends[two] & (curvature.max(axis=0) < ALIKE * curvature.min(axis=0))
     piece = connected_pieces(one[goes_on], two[goes_on], len(triangles))[1]
     faces = Faces(vertices, triangles, np.where(bends, piece, -1))
-    number, bent = find_fillets(faces, vertices, triangles, found.normals, LEAST_BEND)
+    number, bent = find_fillets(faces, vertices, triangles, found.normals, LEAST_BEND, BOWL)
     own_bend = _bend_beside(vertices, triangles, np.isin(faces.of_triangle, number))
     first = np.unique(faces.of_triangle, return_index=True)[1][number]
-    across = hollow_curvatures(vertices, triangles, found.normals)[1]
-    bowl = [np.median(across[faces.of_triangle == k]) for k in number]
-    is_own = (own_bend[first] < BESIDE * bent) & (np.array(bowl) < BOWL * bent)
+    is_own = own_bend[first] < BESIDE * bent
     number, bent = number[is_own], bent[is_own]
     area = faces.area[number]
     is_large = (area >= LEAST * area.sum()) & (area.sum() > LEAST_IN_ALL * faces.area.sum())
