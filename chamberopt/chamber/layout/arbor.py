@@ -1,15 +1,14 @@
-"""Find the bores of a part that an arbor may go through, and the one about which it may turn."""
+"""Find the bores of a part, and hold it on an arbor through one of them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from chamberopt.chamber.fixture import ACROSS
-from chamberopt.chamber.layout.pose import Turns, square_to_walls, turns_down
+from chamberopt.chamber.layout.pose import Turns
 from chamberopt.chamber.layout.target import CREASE_DEG
 from chamberopt.design.fixture import joint_in_words
 from chamberopt.geometry.face_shapes import is_hole
@@ -23,7 +22,6 @@ from chamberopt.geometry.outline import (
 )
 from chamberopt.geometry.triangles import (
     area_vectors,
-    areas,
     centre_of_mass,
     rotation_matrix,
     sides_of,
@@ -47,12 +45,6 @@ WIDER_MM, RIM_MM = 0.5, 1.0
 # its axis from there over the part's size that way.
 CENTRED = 0.25
 UPRIGHT, LEVEL = 0.999, 0.02  # cosines with the vertical of an axis that is upright, and level
-# A part turns about a bore's axis if its target looks the same all round: largest difference of the
-# spread of its normals over their mean, their mean along any way, and the middle's distance from
-# the axis over the target's radius. Its target must lie outside most of the part.
-ALIKE, MEAN, CENTRAL, OUTSIDE = 0.05, 0.03, 0.03, 0.6
-SHORT = 1.0  # largest length along the axis over the diameter: longer parts stand or lie
-RPM = 60.0
 
 
 class Bore(NamedTuple):
@@ -222,44 +214,3 @@ def _depth_of_seat(bore: Bore, mesh: PartMesh, radius: float, even: float) -> fl
             return -math.inf
         depths.append(0.5 * float(np.ptp(wall)) - float(seat.max()))
     return min(depths) if np.ptp(depths) <= even else -math.inf
-
-
-def turning_bore(bores: Sequence[Bore], mesh: PartMesh, target: np.ndarray) -> Bore | None:
-    """Return the bore about whose axis a part turns, so that all of its target passes the shot.
-
-    It is None unless the target is a ring at the outside of a short part, alike all round, such as
-    the teeth of a gear or the slots of a disc.
-
-    Args:
-        target: marks the triangles to be peened, (m,).
-    """
-    weight = areas(mesh.vertices, mesh.triangles)[target]
-    weight = weight / weight.sum()
-    normal = unit_vectors(area_vectors(mesh.vertices, mesh.triangles))[target]
-    middles = mesh.vertices[mesh.triangles[target]].mean(axis=1)
-    for bore in bores:
-        frame = frame_along(bore.axis)
-        across, places = normal @ frame[:2].T, (middles - bore.point) @ frame[:2].T
-        low, high = np.linalg.eigvalsh((weight[:, None] * across).T @ across)
-        radius = np.linalg.norm(places, axis=1)
-        whole = (mesh.vertices - bore.point) @ frame.T
-        outer = float(np.linalg.norm(whole[:, :2], axis=1).max())
-        is_ring = (
-            high - low < ALIKE * (high + low)
-            and np.linalg.norm(weight @ across) < MEAN
-            and np.linalg.norm(weight @ places) < CENTRAL * (weight @ radius)
-            and weight @ radius > OUTSIDE * outer
-        )
-        if is_ring and np.ptp(whole[:, 2]) < SHORT * 2.0 * outer:
-            return bore
-    return None
-
-
-def turning_pose(bore: Bore, mesh: PartMesh) -> tuple[Turns, dict[str, Any]]:
-    """Return turns that lay a bore's axis level along the room's width, and effects.part_turn."""
-    down = np.eye(3)[np.abs(bore.axis).argmin()]
-    down = unit_vectors((bore.axis @ down) * bore.axis - down)
-    turns = square_to_walls(mesh.vertices, turns_down(down))
-    axis = [round(float(x), 6) + 0.0 for x in bore.axis]
-    through = [round(1e3 * float(x), 4) + 0.0 for x in bore.point]
-    return turns, {"rpm": RPM, "axis": axis, "through_mm": through}

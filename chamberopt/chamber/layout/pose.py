@@ -25,9 +25,12 @@ if TYPE_CHECKING:
     from chamberopt.geometry.meshes.part_mesh import PartMesh
 
 Turns = tuple[float, float, float]
-Pose = Literal["standing", "lying", "on-edge"]
+Upright = Literal["standing", "lying", "on-edge"]
 """Which of a part's sizes is upright: its longest one, its shortest one, or that between."""
-AT_SIDE: tuple[Pose, ...] = ("lying", "on-edge")  # in which a part is held at its side
+Pose = Upright | Literal["turning"]
+"""A pose to ask for. A part turns about a level axis, round which its target looks the same."""
+AT_SIDE: tuple[Upright, ...] = ("lying", "on-edge")  # in which a part is held at its side
+TURNING: Literal["turning"] = "turning"
 
 # Advantages in the mean minus standard deviation of the exposure, over poses of any angle: of the
 # pose as drawn, of turns by multiples of 90 and of 45 degrees, and of turns by steps of 15 and 5.
@@ -101,7 +104,7 @@ def hanging_pose(
 
 
 def pose_by_size(
-    vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, pose: Pose
+    vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, pose: Upright
 ) -> Turns:
     """Return turns with which a part stands, lies or stands on edge, its target more down than up.
 

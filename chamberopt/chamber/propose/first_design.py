@@ -15,14 +15,15 @@ import numpy as np
 
 from chamberopt.chamber.checks.place_names import PART_SIDES, SIDE_WALL
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
-from chamberopt.chamber.layout.arbor import RPM, Bore, find_bores, turning_bore, turning_pose
+from chamberopt.chamber.layout.arbor import Bore, find_bores
 from chamberopt.chamber.layout.balls import fit_sizes, propose_ball, sizes_to_try
 from chamberopt.chamber.layout.end import Shape, bare_end, cut_shape, held_end, root_out, strip
 from chamberopt.chamber.layout.floor import SEVERAL, Floor
 from chamberopt.chamber.layout.pose import (
     AT_SIDE,
-    Pose,
+    TURNING,
     Turns,
+    Upright,
     pose_by_size,
     pose_in_words,
     propose_pose,
@@ -36,6 +37,7 @@ from chamberopt.chamber.layout.target import (
     propose_target,
     surfaces,
 )
+from chamberopt.chamber.layout.turning import RPM, Spindle, find_spindle, turning_bore, turning_pose
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.propose.held_proposal import (
     hangs_by_a_face,
@@ -60,7 +62,7 @@ from chamberopt.chamber.propose.proposal import (
     touched_share,
 )
 from chamberopt.chamber.propose.proposed_budget import OF_TIME
-from chamberopt.chamber.propose.proposed_clamp import clamped_outside, grips_poorly
+from chamberopt.chamber.propose.proposed_clamp import clamped_outside, grips_poorly, why_not_turned
 from chamberopt.chamber.propose.proposed_room import (
     AMPLITUDE_UM,
     AT_WALL,
@@ -93,6 +95,8 @@ START = f"{OF_TIME[2]}, a start"
 FEWER = "so that a strip of it takes few sonotrodes"
 NOT_THIN = "so that it is held by an end of thicker metal"
 ASLANT = "the target faces the sonotrode aslant, so that the part itself is held firmly"
+TURNED = "its axis level: about it the part turns, so that all of it passes the shot"
+NO_SPINDLE = "--pose: given turning, but {}; give another pose, or another target (--target)"
 ON_END = "on end, as no single sonotrode is large enough for it lying"
 Chooser = Callable[[Sequence[Surface]], Sequence[str]]
 
@@ -126,6 +130,8 @@ def propose(path: Path, wanted: Wanted, choose: Chooser) -> Proposal:
     _require_near_origin(path, target)
     given = _Given(path, wanted, mesh, known)
     shape = Shape(mesh.vertices, mesh.triangles, target.triangles)
+    if wanted.pose == TURNING:
+        return _turning(given, target)
     if wanted.pose is None:
         stance = Stance(target, *propose_pose(*shape))
     else:
@@ -157,6 +163,24 @@ def propose(path: Path, wanted: Wanted, choose: Chooser) -> Proposal:
             if "holder" in other.tables and faults(other) <= faults(made):
                 return other
     return made
+
+
+def _turning(given: _Given, target: Target) -> Proposal:
+    """Return a proposal whose part turns about a level axis, by an arbor or by its own ends.
+
+    Raises InputError if the target does not go round an axis, or the part cannot turn about it.
+    """
+    mesh = given.mesh
+    shape = mesh.vertices, mesh.triangles, target.triangles
+    if turning_bore(find_bores(mesh, target.triangles), mesh, target.triangles) is not None:
+        free = given._replace(wanted=replace(given.wanted, pose=None))
+        made = _proposed(free, Stance(target, *propose_pose(*shape)))
+        if made.design.effects.part_turn is not None:
+            return made
+    if (spindle := find_spindle(mesh, target.triangles)) is None:
+        raise InputError(NO_SPINDLE.format("the target looks the same round no axis"))
+    turns, _ = turning_pose(spindle, mesh)
+    return _proposed(given, Stance(target, turns, TURNED, is_local=True, spindle=spindle))
 
 
 def _is_no_worse(other: Proposal, made: Proposal) -> bool:
@@ -196,7 +220,7 @@ def _held_otherwise(given: _Given, target: Target, made: Proposal) -> Proposal:
     """
     mesh = given.mesh
     targets = [target, *fewer_fillets(mesh, target)]
-    ways: list[tuple[Pose | None, int]] = [("standing", 0)]
+    ways: list[tuple[Upright | None, int]] = [("standing", 0)]
     ways += [(None, number) for number in range(1, len(targets))]
     second: Proposal | None = None  # on which balls would come to rest
     for pose, number in (*ways, *((one, 0) for one in AT_SIDE)):
@@ -284,7 +308,10 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
     Args:
         like: a proposal in this stance, whose holder and pad are tried first.
     """
-    (path, wanted, mesh, known), (target, turns, pose_reason, end, is_local) = given, stance
+    (path, wanted, mesh, known), (target, turns, pose_reason, end, is_local, spindle) = (
+        given,
+        stance,
+    )
     part_alloy, shop = alloy(wanted.alloy or USUAL_PART).name, wanted.shop or usual_shop()
     shot, shot_reason = choose_shot(wanted.shot, part_alloy, shop)
     whole = target
@@ -315,7 +342,7 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
     with step("choosing the balls"):
         diameter, ball_reason = _ball_diameter(tables, wanted, shop)
     tables["shot"]["diameter_mm"] = round(1e3 * diameter, 4)
-    if not (end or wanted.pose) and (
+    if not (end or wanted.pose or spindle) and (
         hanging := hanging_turns(mesh, target, turns, diameter, wanted)
     ):
         turns, pose_reason = hanging, ON_END
@@ -324,10 +351,12 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
         shape = cut_shape(mesh, np.ones(len(mesh.triangles), dtype=bool), end.room_mm)
     # Balls would lie on what holds an end at the side: it goes out through the wall instead.
     out = end.axis if end is not None and end.goes_out else None
+    if spindle is not None:
+        out = spindle.axis
     bores = find_bores(mesh, target.triangles)
     may_turn = wanted.may_turn and wanted.pose is None
     turning = turning_bore(bores, mesh, target.triangles) if may_turn else None
-    is_whole = turning is None and (end is None or end.strips is None)
+    is_whole = not (turning or spindle) and (end is None or end.strips is None)
     if is_whole and not can_be_mounted(shape, turns, diameter, wanted, out):
         poses = {turns: pose_reason}
         for one in AT_SIDE if wanted.pose is None else ():
@@ -360,12 +389,12 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
 
     goes_out = out is not None
 
-    def built(is_local: bool, turning: Bore | None = None) -> tuple[Proposal, Floor]:
+    def built(is_local: bool, turning: Bore | Spindle | None = None) -> tuple[Proposal, Floor]:
         """Return the proposal with the least room that is free of gaps, else of fewest faults.
 
         Args:
             is_local: true for a chamber round the target, whose walls the part goes out through.
-            turning: a bore about whose axis, which is then level, the part turns.
+            turning: about whose axis, which is then level, the part turns.
         """
         best: tuple[Proposal, Floor] | None = None
         refused: InputError | None = None
@@ -373,7 +402,7 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
         if turning is not None:
             pose, turn = turning_pose(turning, mesh)
             common = {**tables, "effects": {**tables["effects"], "part_turn": turn}}
-            why_so = "its axis level: about it the part turns, so that all of it passes the shot"
+            why_so = TURNED
             form = replace(wanted, shape=wanted.shape or "box")
         for number, wider in enumerate(WIDER):
             progress(number, len(WIDER), None)
@@ -387,8 +416,9 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
                 words = {"part.rotate_deg": f"{pose_in_words(mesh, known, placed)}: {why_so}"}
                 if turning is not None:
                     words["part.rotate_deg"] = why_so
+                    its = "its shaft is" if spindle is None else "its ends are"
                     words["effects.part_turn"] = (
-                        f"TURNED BY A DRIVE, at {RPM:g} rpm: its shaft is sealed in the wall"
+                        f"TURNED BY A DRIVE, at {RPM:g} rpm: {its} sealed in the wall"
                     )
                 why = {**reasons, **words, **floor_reasons(floor, goes_out, diameter)}
                 made = checked(own, why, floor, known, mesh, wanted.shop)
@@ -410,7 +440,7 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
     spare: tuple[Proposal, Floor] | None = None  # a room of which the part is held badly
     with step("building and checking the chamber") as progress:
         is_local |= goes_out
-        made, floor = built(is_local)
+        made, floor = built(is_local, spindle)
         is_large = not floor.is_one_sonotrode or made.is_capped
         if is_large and not is_local and like is None:
             with suppress(InputError):
@@ -424,12 +454,14 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
                         spare = local, its_floor
                     elif faults(local) <= faults(made):
                         made, floor, is_local = local, its_floor, True
-    if made.chamber.pieces_in_air:
+    if made.chamber.pieces_in_air and spindle is None:
         with step("choosing what holds the part") as progress:
             above = None if goes_out else end
             made = held(made, floor, target, above, bores, wanted.shop, progress, like)
     elif "holder" not in made.tables:
         made = clamped_outside(made, floor, wanted.shop)
+    if spindle is not None and (why_not := why_not_turned(made)):
+        raise InputError(NO_SPINDLE.format(why_not))
     is_small = floor.face is not None and made.sonotrode_count <= FEW
     is_good = is_small and "holder" in made.tables
     if spare is not None and not is_good and faults(spare[0]) <= faults(made):
@@ -449,7 +481,7 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
     made = replace(
         made,
         reasons={**made.reasons, **room_reason(made, floor)},
-        stance=Stance(whole, turns, pose_reason, end, is_local),
+        stance=Stance(whole, turns, pose_reason, end, is_local, spindle),
     )
     if spare is None or end is not None or wanted.pose is not None or not grips_poorly(made):
         return made

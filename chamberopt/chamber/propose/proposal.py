@@ -15,9 +15,10 @@ from chamberopt.chamber.checks.warning import UNPEENED, DesignWarning, WarningKi
 from chamberopt.chamber.layout.balls import MOST_BALLS, SizeFit, charge_of
 from chamberopt.chamber.layout.end import HeldEnd, Strips
 from chamberopt.chamber.layout.floor import Floor
-from chamberopt.chamber.layout.pose import Pose, Turns
+from chamberopt.chamber.layout.pose import Pose, Turns, Upright
 from chamberopt.chamber.layout.sizes import Sizes
 from chamberopt.chamber.layout.target import Surface, Target
+from chamberopt.chamber.layout.turning import Spindle
 from chamberopt.chamber.scene import MAX_BALLS, chamber_mesh
 from chamberopt.chamber.shop import Shop, ShopSonotrode
 from chamberopt.common.errors import InputError
@@ -77,7 +78,7 @@ class Wanted:
     # How a part that an end of thin metal would hold is held otherwise, where that was found: with
     # so many fillets fewer as its target, or in a pose.
     without_fillets: int = 0
-    thick_pose: Pose | None = None
+    thick_pose: Upright | None = None
 
 
 class Stance(NamedTuple):
@@ -88,6 +89,7 @@ class Stance(NamedTuple):
     why: str  # it is turned so
     end: HeldEnd | None = None  # an end that is left out, or all beside a strip
     is_local: bool = False  # true if the chamber is round the target, and the part goes out
+    spindle: Spindle | None = None  # by which its ends turn it
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,7 @@ class Proposal:
     # True if its chamber holds fewer balls than it should, as more take too long.
     is_capped: bool = False
     without_fillets: int = 0  # those of Wanted, to propose the same again
-    thick_pose: Pose | None = None
+    thick_pose: Upright | None = None
     closed: tuple[str, ...] = ()  # sides at which a face of the part is the wall, such as "-x"
     # Of all replicas of a candidate [s], to know the time in which its target is covered; None if
     # no pilot ran, or balls do not touch enough of the target.

@@ -6,16 +6,18 @@ import math
 
 import numpy as np
 
+from chamberopt.chamber.checks.openings import find_openings
 from chamberopt.chamber.checks.place_names import CEILING, surface_names
 from chamberopt.chamber.layout.end import DEEP
 from chamberopt.chamber.layout.floor import Floor
 from chamberopt.chamber.layout.grip import Clamp, flat_jaws
 from chamberopt.chamber.layout.target import apart, area_in_mm2, named_or_all
+from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.propose.proposal import Proposal, checked, with_table
 from chamberopt.chamber.propose.proposed_mask import rows_of
 from chamberopt.chamber.shop import Shop
 from chamberopt.design.fixture import WIDEST_GAP, tight_gap_mm
-from chamberopt.geometry.outline import fitted_circle
+from chamberopt.geometry.outline import fitted_circle, frame_along
 from chamberopt.geometry.solids import passes_opening
 from chamberopt.geometry.triangles import unit_normals
 
@@ -26,6 +28,9 @@ MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area 
 # Of a round face: how far its corners may be off a circle, over its radius, and the sum of its area
 # vectors over its area.
 OFF_ROUND, ALL_WAYS = 0.02, 0.2
+# Of a part that turns: ball diameters between it and the walls, so that no ball is jammed there,
+# and m between its axis and the middle of an opening.
+FREE, OFF_AXIS = 1.0, 2e-4
 
 
 def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
@@ -34,8 +39,9 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     keys = {"kind": "bore", "clearance_mm": clearance_mm}
     tables = with_table(made.tables, "sonotrode", "holder", keys)
     by = f" by {clamp.text}" if (clamp := _clamp(made)).text else ""
+    holds = "clamped" if made.design.effects.part_turn is None else "chucked, and turned,"
     text = (
-        f"clamped where it stands out of the chamber at {', '.join(_sides_out(made))}{by}; the "
+        f"{holds} where it stands out of the chamber at {', '.join(_sides_out(made))}{by}; the "
         f"wall, cut out {clearance_mm:g} mm round it so that no ball passes, "
         f"{_mounting(made, 1e-3 * clearance_mm)}"
     )
@@ -47,6 +53,34 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
         )
     reasons = {**made.reasons, "holder.kind": text}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
+
+
+def why_not_turned(made: Proposal) -> str:
+    """Return why a part cannot turn by its own ends in a chamber; "" if it can.
+
+    What goes out through a wall has to be round about the axis there, and as long as a chuck grips.
+    What is in the room has to clear walls and ceiling by a ball as it turns.
+    """
+    chamber, ball = made.chamber, max(made.design.shot.diameters)
+    line = turning_axis(made.design, chamber.part)
+    if line is None:
+        return "no axis is given"
+    (point, axis), openings = line, find_openings(chamber)
+    frame = frame_along(axis)
+    for one in openings:
+        away = float(np.linalg.norm(((one.place - point) @ frame.T)[:2]))
+        if one.form != "round" or away > OFF_AXIS:
+            return "it is not round about that axis where it goes out through a wall"
+    if max((one.beyond for one in openings), default=0.0) < DEEP:
+        return "none of its ends stands out of the room to be turned by"
+    low, high = chamber.vertices.min(axis=0), chamber.vertices.max(axis=0)
+    ends = np.sort([(corner - point) @ axis for corner in (low, high)])
+    places = (chamber.part.vertices - point) @ frame.T
+    inside = (places[:, 2] > ends[0]) & (places[:, 2] < ends[1])
+    reach = float(np.linalg.norm(places[inside, :2], axis=1).max(initial=0.0)) + FREE * ball
+    across = np.abs(axis) < 0.5
+    room = min(float((point - low)[across].min()), float((high - point)[across].min()))
+    return "" if reach <= room else "it would come nearer to a wall than a ball as it turns"
 
 
 def _mounting(made: Proposal, clearance: float) -> str:

@@ -20,7 +20,7 @@ import numpy as np
 
 from chamberopt.chamber.layout.balls import MOST_BALLS
 from chamberopt.chamber.layout.floor import SEVERAL
-from chamberopt.chamber.layout.pose import AT_SIDE, Pose
+from chamberopt.chamber.layout.pose import AT_SIDE, TURNING, Pose
 from chamberopt.chamber.propose.held_proposal import rests
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, new_harm, with_charge
 from chamberopt.chamber.propose.proposed_budget import LONG, Measured, TooSlowError
@@ -32,6 +32,7 @@ SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways 
 # Time of all sonotrodes over that of the way before, below which a way is taken. Pilots know a time
 # to 10 to 20 %. A way is no weaker than this share of the intensity before.
 QUICKER, AS_STRONG, HALF = 0.8, 0.8, 0.5
+POSES: tuple[Pose, ...] = (*AT_SIDE, TURNING)  # that are tried
 LAYER = 2.0  # over half a layer
 SAME = 0.999  # cosine between the directions that point up, from which on a pose is no other one
 
@@ -62,9 +63,9 @@ def propose_quicker(
     tried: list[tuple[Way, str]] = []
     if _is_slow(first) and first.wanted.pose is None and not turns(first.made):
         poses = dict(
-            zip(AT_SIDE, again([replace(first.wanted, pose=one) for one in AT_SIDE]), strict=True)
+            zip(POSES, again([replace(first.wanted, pose=one) for one in POSES]), strict=True)
         )
-        for pose, over in product(AT_SIDE, (False, True)):
+        for pose, over in product(POSES, (False, True)):
             if over and not (tried and _needs_both_sides(tried[-1][0], pose)):
                 continue
             wanted = replace(first.wanted, pose=pose, turned_over=over)
@@ -76,7 +77,7 @@ def propose_quicker(
                     continue
             if made is None:
                 continue
-            if float(_up(made) @ _up(first.made)) > SAME:
+            if float(_up(made) @ _up(first.made)) > SAME and not turns(made):
                 continue
             harm, found = _harm(made, first.made), None
             try:
@@ -106,6 +107,8 @@ def propose_quicker(
 
 def _needs_both_sides(one: Way, pose: Pose) -> bool:
     """Return whether a way in a pose leaves out what looks up: balls rest there, or few come."""
+    if turns(one.made):
+        return False
     is_rough = one.found is not None and not one.found.places
     return one.wanted.pose == pose and (is_rough or rests(one.made))
 

@@ -31,7 +31,7 @@ def new(
     material: str = "",
     shot: str = "",
     ball_mm: float | None = None,
-    pose: Literal["standing", "lying", "on-edge"] | None = None,
+    pose: Literal["standing", "lying", "on-edge", "turning"] | None = None,
     shop: Path | None = None,
     intensity: str | None = None,
     coverage: float | None = None,
@@ -63,9 +63,9 @@ def new(
         Diameter of a ball; by default the largest in stock that suits the target's fillets and
         slots, and jams in no gap.
     pose
-        How the part is held: by its longest size upright, its shortest one, or that between. By
-        default its target is evenly exposed; where a long part then takes long, the others are
-        tried by pilot runs.
+        How the part is held: by its longest size upright, its shortest one, or that between, or
+        turning about a level axis round which its target goes. By default its target is evenly
+        exposed; where a part then takes long, the others are tried by pilot runs.
     shop
         A file of the sonotrodes, balls and sizes of chambers that your shop has; nothing else is
         proposed. `chamberopt shop --example` prints one. By default usual sizes.

@@ -7,16 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from manifold3d import Manifold, OpType
+from manifold3d import Manifold
 
-from chamberopt.chamber.layout.arbor import arbor_through, find_bores, turning_bore, turning_pose
+from chamberopt.chamber.layout.arbor import arbor_through, find_bores
 from chamberopt.chamber.layout.holder import holder_choices
 from chamberopt.chamber.layout.target import Surface
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
-from chamberopt.geometry.triangles import rotation_matrix
 from tests.helpers.more_parts import MORE_PARTS
 
 BALL = 1e-3
@@ -164,33 +163,6 @@ def test_cups_leave_nothing_of_a_hub_to_the_shot(tmp_path: Path) -> None:
             rows |= one.triangles
     assert rows.any()
     assert made.chamber.exposed_area[rows].sum() < 1e-3 * made.chamber.part.area[rows].sum()
-
-
-def test_a_ring_of_alike_teeth_turns_about_its_bore() -> None:
-    """A toothed disc turns; with half of its teeth as target, or none outside, it does not."""
-    teeth = [
-        Manifold.cube((6, 3, 12)).translate([28, -1.5, 0]).rotate([0, 0, 360 / 16 * k])
-        for k in range(16)
-    ]
-    gear = Manifold.batch_boolean([ring(30, 10, 12), *teeth], OpType.Add)
-    mesh, body = part_of(gear)
-    middle = body.triangles_center
-    outside = (np.hypot(*middle[:, :2].T) > 29.0) & (np.abs(body.face_normals[:, 2]) < 0.5)
-    bores = find_bores(mesh, outside)
-    bore = turning_bore(bores, mesh, outside)
-    assert bore is not None
-    assert turning_bore(bores, mesh, outside & (middle[:, 0] > 0.0)) is None
-    inside = np.hypot(*middle[:, :2].T) < 29.0
-    assert turning_bore(bores, mesh, inside & ~bore.triangles) is None
-
-    turns, turn = turning_pose(bore, mesh)
-    level = rotation_matrix(turns) @ bore.axis
-    assert np.abs(level) == pytest.approx([0, 1, 0], abs=1e-6)  # across the room's length
-    assert np.abs(turn["axis"]) == pytest.approx([0, 0, 1])
-    assert turn["through_mm"][:2] == pytest.approx([0, 0], abs=1e-3)
-    first = holder_choices(mesh, outside, turns, BALL, bores)[0]
-    assert first.keys["kind"] == "arbor"
-    assert first.keys["both_sides"]
 
 
 def turns_on_an_arbor(made: Proposal) -> None:

@@ -216,7 +216,7 @@ def test_a_quicker_way_is_no_weaker(poses: dict[Pose | None, Proposal]) -> None:
 
 
 def of(poses: dict[Pose | None, Proposal]) -> Callable[[Sequence[Wanted]], list[Proposal | None]]:
-    return lambda many: [poses[one.pose] for one in many]
+    return lambda many: [poses.get(one.pose) for one in many]
 
 
 def with_intensity(found: Measured, value: float) -> Measured:
