@@ -15,7 +15,7 @@ from chamberopt.chamber.fixture import plugs_in_words, size_in_words
 from chamberopt.chamber.layout.pose import axis_down
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.key_words import in_words, key_in_words, title_with_unit, unit_of
-from chamberopt.common.number_text import estimate_text, percent
+from chamberopt.common.number_text import estimate_text, percent, rounded
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.calibration import why_no_intensity
 from chamberopt.design.fixture import joint_in_words, slit_in_words, slit_mm
@@ -189,6 +189,9 @@ EXPECTED = (
     "compression_depth_um",
 )
 OF_STRIPS = ("strength_um", "saturation_time_s", "compression_depth_um")
+# Of the expected saturation time, after which strips are peened: a curve has at least four points,
+# one of them at twice that time or later (SAE J443).
+STRIP_TIMES = (0.25, 0.5, 1.0, 2.0)
 DROP_SPEED = 3.0  # m/s, the speed of a ball that falls 0.46 m; docs/how_to/calibrate.md
 SHEETS_OF = {
     "study": "The best chamber of a study, confirmed on fresh seeds",
@@ -209,6 +212,7 @@ class AsBuilt(NamedTuple):
     usual: WantedIntensity | None = None  # Almen intensity of its metal and thickness
     later: Sequence[Sequence[Opening]] = ()  # openings in each further step
     level_mm: int | None = None  # of the target above the sonotrode, where strips are set
+    radii: Sequence[float] = ()  # of the fillets that are the target [m]
 
 
 def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Document:
@@ -253,6 +257,8 @@ def title_block(result: Result, name: str) -> dict[str, str]:
     return {
         "design": name,
         "chamberopt, simulated": f"{record.versions['chamberopt']}, {record.created[:10]}",
+        "replicas, first seed": f"{record.replicas}, {result.seeds[0]}",
+        "part, sha256": record.part_sha256[:DIGEST],
         "design, sha256": design_sha256(result)[:DIGEST],
         "result, sha256": record.sha256[:DIGEST],
         **dict.fromkeys(TO_FILL, ""),
@@ -300,12 +306,12 @@ def setting_tables(result: Result, built: AsBuilt) -> list[Table]:
     A row with an empty name holds a sentence.
     """
     return _tables([
-        ("Part and pose", _part(result, built.strip)),
+        ("Part and pose", _part(result, built)),
         ("Chamber", _chamber(result, built)),
         ("Sonotrode", _sonotrode(result, built.face_mm)),
         ("Shot", _shot(result)),
         ("Steps", _steps(result, built)),
-        ("Made with", _identity(result)),
+        ("To peen a part", _run(result)),
         ("Peening, and what to expect", _expected(result, built.usual)),
     ])  # fmt: skip
 
@@ -326,7 +332,8 @@ def _tables(found: Sequence[tuple[str, Iterator[Row]]]) -> list[Table]:
     return [one for one in tables if one.rows]
 
 
-def _part(result: Result, strip: StripOfTarget | None) -> Iterator[Row]:
+def _part(result: Result, built: AsBuilt) -> Iterator[Row]:
+    strip = built.strip
     part, turn = result.design.part, result.design.effects.part_turn
     yield "part", part.mesh_path.name
     yield "metal", _metal(result)
@@ -352,7 +359,8 @@ def _part(result: Result, strip: StripOfTarget | None) -> Iterator[Row]:
     # A strip is told in a row of its own.
     chosen = part.target.model_copy(update={} if strip is None else {"box_mm": None})
     if words := chosen.in_words:
-        yield "target, chosen by", words
+        radii = " and ".join(plain(1e3 * one) for one in built.radii)
+        yield "target, chosen by", f"fillets of {radii} mm: {words}" if radii else words
     if strip is not None:
         yield "a strip at a time", _of_strip(strip)
 
@@ -603,7 +611,7 @@ def _steps(result: Result, built: AsBuilt) -> Iterator[Row]:
     The drawing and the other tables are of the first.
     """
     if result.design.steps:
-        yield "", "Drawing and tables are of the first step; the others differ from it:"
+        yield "", "Tables and the drawing here are of the first step; the others differ from it:"
     yield from (("", one.text) for one in answer_lines(result) if one.about == "step")
     first, *others = (
         [f"{_of_opening(one)} at {_place(one)} mm" for one in openings]
@@ -612,6 +620,25 @@ def _steps(result: Result, built: AsBuilt) -> Iterator[Row]:
     for number, found in enumerate(others, start=2):
         if found != first:
             yield from _first([(f"opening, step {number}", one) for one in found], "openings")
+
+
+def _run(result: Result) -> Iterator[Row]:
+    """Yield what an operator does for each part, in its order."""
+    design = result.design
+    if design.effects.part_turn is not None:
+        yield "1 mount", "the part and its drive; turn it once by hand: it touches no wall"
+    else:
+        yield "1 mount", "the part as above; measure from it to the face at rest"
+    masses = [f"{plain(_weighed_g(one.shot))} g" for one in design.in_steps.values()]
+    yield "2 fill", f"{masses[0]} of balls, weighed; close the chamber"
+    shares = [one.process.treatment_time for one in design.in_steps.values()]
+    each = ", then ".join(
+        f"{plain(time)} s as step {number}" for number, time in enumerate(shares, 1)
+    )
+    time = f"{plain(design.process.treatment_time)} s"
+    yield "3 peen", f"{time}: {each} (see Steps)" if design.steps else time
+    yield "4 weigh", "the balls again: what lacks is in a gap or in the part"
+    yield "5 look", "at the target through a lens of 10 times: no place without dents"
 
 
 def _expected(result: Result, usual: WantedIntensity | None) -> Iterator[Row]:
@@ -693,16 +720,6 @@ def _warnings(result: Result) -> Iterator[Row]:
         yield from (("", keys_in_words(text)) for text in left)
 
 
-def _identity(result: Result) -> Iterator[Row]:
-    record = result.record
-    program = f"chamberopt {record.versions['chamberopt']}, {record.created[:10]}"
-    yield "simulated by", f"{program}, {record.replicas} replicas, seed {result.seeds[0]}"
-    yield "part, sha256", record.part_sha256
-    if record.shape_sha256:
-        yield "shape, sha256", record.shape_sha256
-    yield "result, sha256", record.sha256
-
-
 def first_checks(result: Result, level_mm: int | None = None) -> Table:
     """Return the quantities to measure before production, each with its expected value.
 
@@ -743,7 +760,7 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
         yield f"mean coverage of the target after {after}", estimate_text(share, 100.0, "%")
     intensity = result.metrics.get("almen_intensity")
     if intensity is None:
-        strips = "A strips at 4 or 5 times, for chamberopt calibrate"
+        strips = f"A strips {_strip_times(result)}, for chamberopt calibrate"
         if level_mm is not None and not why_no_strip(design, StripSize()):
             strips += f"; in the lid in place of the part, {level_mm} mm from the sonotrode"
         rough = PredictedIntensity.of(result.metrics, calibration)
@@ -753,9 +770,18 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
         yield strips, known
     else:
         text = metric_label("almen_intensity").format(intensity)
-        yield "intensity by A strips at the target", text
+        yield f"intensity by A strips at the target, {_strip_times(result)}", text
     masses = {plain(_weighed_g(one.shot)): None for one in design.in_steps.values()}
     yield "mass of the shot, before and after", f"{' g, then '.join(masses)} g before"
+
+
+def _strip_times(result: Result) -> str:
+    """Return in words after which times strips are peened."""
+    saturation = result.metrics.get("saturation_time_s")
+    if saturation is None or not saturation.has_number:
+        return "at 4 or 5 times"
+    *times, last = (rounded(share * saturation.value, 2) for share in STRIP_TIMES)
+    return f"after {', '.join(times)} and {last} s"
 
 
 def calibrated_to(result: Result) -> Iterator[Sentence]:

@@ -110,6 +110,9 @@ FACE = 2.5  # mm on paper, thickness of the drawn sonotrode
 MOST_OUTSIDE = 15.0  # mm on paper, most of the part that is drawn outside the chamber
 BEYOND = 0.1  # mm on paper that a part goes on at least where it is broken off
 BREAK, WAVE = 0.5, 3.0  # mm, height and length of the waves of a line where the part is broken off
+# mm on paper: jaws that hold the part outside begin so far from the wall, with so much of it beyond
+# them, and are so long and thick.
+JAWS_FROM, JAWS_LONG, JAWS_THICK = 2.5, 4.0, 2.0
 OFF_AXIS = 0.05  # mm: a section that is farther beside the axis has its place dimensioned
 ROOM, PART, TARGET = "#e8f1f7", "#c9ced3", KINDS["target"].colour
 RASTER = 200  # dots an inch, for the part in the plan
@@ -179,7 +182,7 @@ def draw_chamber(
         face: on which the chamber stands, whose joints the plan shows, and its rim where it is
             larger than the floor.
     """
-    low, high = _ends(chamber)
+    (low, high), has_jaws = _ends(chamber), False
     planes = section_planes(chamber)
     scale, outside, needs = _fit(chamber, planes, size)
     middle = top - 0.5 * size[1]
@@ -189,7 +192,7 @@ def draw_chamber(
         axis = np.array([plane.right, 2])
         corner = np.array([x + BESIDE + more[0], middle - 0.5 * (tall + more[1]) + 1.0])
         view = View(plane.right, scale, corner, low[axis], high[axis], more)
-        _draw_section(axes, chamber, view, plane.at, name, limits)
+        has_jaws |= _draw_section(axes, chamber, view, plane.at, name, limits)
         x = corner[0] + scale * (high - low)[plane.right] + more[0] + BESIDE
     corner = np.array([x + BESIDE, middle - 0.5 * deep + 1.0])
     view = View(0, scale, corner, low[:2], high[:2], np.zeros(2))
@@ -197,8 +200,9 @@ def draw_chamber(
     dashed = [] if face is None else _draw_face(axes, chamber, view, face)
     text = _scale_in_words(scale)
     what = "Section A–A" if len(planes) == 1 else "Sections A–A and B–B"
+    jaws = ", white and hatched: jaws" if has_jaws else ""
     dashes = f", dashed: {' and '.join(dashed)}" if dashed else ""
-    return f"{what} and plan, scale {text}{dashes}"
+    return f"{what} and plan, scale {text}{dashes}{jaws}"
 
 
 def drawing_height(chamber: Chamber, size: Point) -> float:
@@ -261,7 +265,14 @@ def _with_limits(text: str, length: float, limits: Limits, *keys: str) -> str:
 
 def _draw_section(
     axes: Axes, chamber: Chamber, view: View, at: float, name: str, limits: Limits
-) -> None:
+) -> bool:
+    """Draw a section. Return whether jaws are in it, which hold the part outside.
+
+    Args:
+        at: place of the section's plane [mm].
+        name: letter of the section.
+        limits: those of draw_chamber.
+    """
     other = 1 - view.right
     side = ("length_mm", "width_mm")[view.right]
     lines, row = cut(chamber.vertices, chamber.triangles, other, 1e-3 * at)
@@ -270,6 +281,7 @@ def _draw_section(
     _fill(axes, view, lines, window, facecolor=ROOM, lw=0.0)
     _fill(axes, view, own, window, facecolor=PART, edgecolor=DARK_GREY, hatch="////", lw=0.5)
     _draw_breaks(axes, view, own)
+    has_jaws = "holder" not in chamber.fixtures and _draw_jaws(axes, view, own)
     tags, target = chamber.tags[row], chamber.on_target[row]
     _lines(axes, view, lines[tags == TAG_WALL], BLACK, 1.1)
     _lines(axes, view, lines[tags > TAG_WALL], SONOTRODE, 2.5)
@@ -306,6 +318,7 @@ def _draw_section(
     dimension(axes, (left, y), (left, low_at), 4.5, text, upright=True)
     text = _with_limits(plain(view.high[1]), float(view.high[1]), limits, "height_mm")
     dimension(axes, (right, y), (right, top), -4.5, text, upright=True)
+    return has_jaws
 
 
 def _draw_breaks(axes: Axes, view: View, lines: np.ndarray) -> None:
@@ -332,6 +345,41 @@ def _draw_breaks(axes: Axes, view: View, lines: np.ndarray) -> None:
             wave = edge + BREAK * np.sin(2.0 * np.pi * (along - start) / WAVE)
             x, y = (wave, along) if axis == 0 else (along, wave)
             axes.plot(x, y, color=BLACK, lw=0.6)
+
+
+def _draw_jaws(axes: Axes, view: View, lines: np.ndarray) -> bool:
+    """Draw jaws at both sides of a part, wherever it stands far enough out of the chamber.
+
+    Return whether there are any.
+
+    Args:
+        lines: lines of the part's section, (k, 2, 2) [m].
+    """
+    from matplotlib.patches import Rectangle
+
+    (sides, above), has_jaws = view.outside, False
+    low, high = view.place([view.low, view.high])
+    ends = view.place(1e3 * lines)
+    beyond = ends.min(axis=(0, 1)), ends.max(axis=(0, 1))
+    ways = (0, low[0], -1.0, sides), (0, high[0], 1.0, sides), (1, high[1], 1.0, above)
+    for axis, wall, way, drawn in ways:
+        stands_out = way * (beyond[int(way > 0.0)][axis] - wall)
+        if min(drawn, stands_out) < JAWS_FROM + JAWS_LONG:
+            continue
+        start = wall + way * JAWS_FROM
+        at = ends[..., axis]
+        held = ((start < at) & (at < start + way * JAWS_LONG)).any(axis=1)
+        held |= (at[:, 0] > start) != (at[:, 1] > start)
+        if not held.any():
+            continue
+        has_jaws, across = True, ends[held][..., 1 - axis]
+        for edge, outwards in ((float(across.min()), -1.0), (float(across.max()), 1.0)):
+            corner = min(start, start + way * JAWS_LONG), min(edge, edge + outwards * JAWS_THICK)
+            size = JAWS_LONG, JAWS_THICK
+            x, wide = (corner, size) if axis == 0 else (corner[::-1], size[::-1])
+            look: Any = {"facecolor": "white", "edgecolor": BLACK, "hatch": "\\\\\\\\", "lw": 0.7}
+            axes.add_patch(Rectangle(x, *wide, **look))
+    return has_jaws
 
 
 def _draw_fixtures(axes: Axes, chamber: Chamber, view: View, at: float) -> None:

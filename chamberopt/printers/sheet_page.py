@@ -14,6 +14,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from chamberopt.chamber.checks.fillets import radii_of_target
 from chamberopt.chamber.checks.openings import find_openings
 from chamberopt.chamber.checks.strips import strip_of_target
 from chamberopt.chamber.checks.usual import usual_for_target
@@ -64,7 +67,7 @@ LEAST_ALONE = 6.5  # pt: with smaller letters than these on one page there are f
 # Height of the drawing with its caption [mm]: the least for each pt of the text, and the most.
 DRAWING_PER_PT, MOST_DRAWING = 13.0, 125.0
 CAPTION, ROW = 7.0, 8.0  # mm, of the caption, and of a row of the title block
-FIELDS = 5  # in a row of the title block
+FIELDS = 6  # in a row of the title block
 FOOT = MARGIN + 2.0 * ROW + 3.0  # mm, where the content ends
 RED = "#C00000"
 COLUMNS = (88.0, 62.0, 36.0)  # mm, of a table with a head
@@ -272,6 +275,7 @@ def write_sheet(
             usual_for_target(design, part),
             [find_openings(step) for step in chamber.steps[1:]],
             target_level_mm(chamber),
+            radii_of_target(design, part),
         )
         sheet = process_sheet(loaded, built, revision)
         limits, face = slit_limits(loaded) | chamber_limits(loaded), design.sonotrode.face
@@ -289,8 +293,9 @@ def draw_sheet(
 ) -> list[Figure]:
     """Return a process sheet as figures of its pages.
 
-    The first page has a heading, sentences in red, a drawing of the chamber and the content, the
-    last one the outlines of openings, and each page has the title block at its foot.
+    The first page has a heading, sentences in red, a drawing of the chamber and the content. Each
+    further step in which the part stands otherwise has a page with its drawing. The last page has
+    the outlines of openings. Each page has the title block at its foot.
 
     Args:
         sheet: a document as process_sheet makes it.
@@ -321,6 +326,7 @@ def draw_sheet(
     if not alone:
         measured = [one for one in content if one not in settings]
         pages += _further_pages(further, measured, sheet.name)
+    pages += _further_steps(chamber, sheet.name, limits, face)
     if openings:
         last, y = _further_page("Openings", sheet.name)
         scale = draw_openings(last, openings, MARGIN, y - CAPTION, (INNER, y - FOOT - CAPTION))
@@ -413,6 +419,28 @@ def _further_pages(section: Section, measured: Sequence[Block], name: str) -> It
                 y, caption = write.caption(caption, MARGIN, y, INNER), ""
             y = write.row(row, MARGIN, y, INNER, names) - 0.3 * write.line
         y -= 0.8 * write.line
+
+
+def _further_steps(
+    chamber: Chamber, name: str, limits: Limits, face: Face | None
+) -> Iterator[Axes]:
+    """Yield pages with a drawing of each further step in which the part stands otherwise.
+
+    Args:
+        name: name of the sheet.
+        limits, face: those of draw_sheet.
+    """
+    drawn = [chamber.part.vertices]
+    for number, room in enumerate(chamber.steps[1:], start=2):
+        posed = room.part.vertices
+        if not any(one.shape == posed.shape and np.allclose(one, posed) for one in drawn):
+            axes, y = _further_page(f"Step {number}", name)
+            tall = drawing_height(room, (INNER, MOST_DRAWING))
+            views = draw_chamber(axes, room, MARGIN, y, (INNER, tall), limits, face)
+            text = f"{views}, {LEGEND}"
+            Writer(axes, 6.0).write(text, MARGIN, y - tall, INNER, colour=DARK_GREY)
+            drawn.append(posed)
+            yield axes
 
 
 def _further_page(title: str, name: str) -> tuple[Axes, float]:

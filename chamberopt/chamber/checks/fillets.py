@@ -18,12 +18,14 @@ from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.largest_ball import largest_balls
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
 from chamberopt.design.shape_surface import TAG_PART
+from chamberopt.geometry.smoothing.fillets import face_at, faces_of, fillets_of
 from chamberopt.geometry.triangles import area_vectors, edge_keys, sides_of
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.part import Part
     from chamberopt.chamber.reach import Reach
+    from chamberopt.design.design import Design
 
 LEAST_SHARE = 0.01  # share of the target's area that is worth a warning
 # degrees: facets that turn by less look 10 degrees aside of their round at most, so that a ball
@@ -34,6 +36,26 @@ FAR_TURN = 20.0
 def facets_are_left(part: Part) -> bool:
     """True if coarse facets take so much of the target that they decide its coverage."""
     return part.smoothing is not None and part.smoothing.coarse_share >= LEAST_SHARE
+
+
+def radii_of_target(design: Design, part: Part) -> list[float]:
+    """Return the radii [m] of the fillets that are the target, the widest first.
+
+    There are none if anything but fillets is chosen, or by other means than a place on each.
+    """
+    chosen, file = design.part.target.faces, part.file
+    if file is None or any(one.border not in ("fillet", "cad_face") for one in chosen):
+        return []
+    mesh, found = file.as_read, set[float]()
+    fillets = fillets_of(mesh)
+    for one in chosen:
+        faces = faces_of(mesh, one.border)
+        face, _ = face_at(mesh, faces, one.border, 1e-3 * np.array(one.at_mm))
+        number = int(fillets.of_triangle[faces.of_triangle == face].min())
+        if number < 0:
+            return []
+        found.add(float(f"{1.0 / fillets.curvature[number]:.3g}"))
+    return sorted(found, reverse=True)
 
 
 def facet_warnings(part: Part, ball: float, reachable: float) -> list[DesignWarning]:

@@ -1,5 +1,6 @@
 """A result of a design with steps says what each step does, and keeps it on disk."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from chamberopt.documents.answer import answer_lines
 from chamberopt.documents.document import Table
 from chamberopt.documents.sheet import AsBuilt, process_sheet
 from chamberopt.documents.zones import changes_in_words, steps_section
+from chamberopt.printers.sheet_page import draw_sheet
 from chamberopt.results.arrays_file import load_chamber
 from chamberopt.results.load import Result, load_result
 from chamberopt.results.rebuild import rebuild_chamber
@@ -68,6 +70,21 @@ def test_answer_report_and_sheet_have_a_line_for_each_step(result: Result) -> No
     rows = [row for one in first_page if isinstance(one, Table) for row in one.rows]
     assert ("", lines[1]) in rows
     assert ("peening time", "10 s, all steps together") in rows
+
+
+def test_the_sheet_has_a_drawing_of_each_pose(result: Result) -> None:
+    """The part is turned over in the second step; with finer balls alone it would not be."""
+    sheet, chamber = process_sheet(result, AsBuilt((50.0,))), load_chamber(result)
+    one, two = chamber.steps
+    for steps, more in (((one, two), 1), ((one, one), 0), ((one, two, two), 1)):
+        pages = draw_sheet(sheet, replace(chamber, steps=steps))
+        texts = [[text.get_text() for text in page.axes[0].texts] for page in pages]
+        assert sum("Step 2" in page for page in texts) == more
+        assert sum(any(text.startswith("A–A") for text in page) for page in texts) == 1 + more
+    rows = [
+        row for table in sheet.sections[0].content if isinstance(table, Table) for row in table.rows
+    ]
+    assert ("3 peen", "10 s: 5 s as step 1, then 5 s as step 2 (see Steps)") in rows
 
 
 def test_changes_are_told_in_words() -> None:

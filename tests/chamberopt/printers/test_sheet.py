@@ -21,6 +21,7 @@ from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text
+from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.almen_strip import USUAL_K
 from chamberopt.design.fixture import LEAST_GAP_MM, joint_in_words, slit_mm, tight_gap_mm
 from chamberopt.design.intensity import WantedIntensity
@@ -95,7 +96,8 @@ def test_its_figures_are_those_of_the_report(folder: Path) -> None:
     assert rows["Sonotrode"]["face in the chamber"] == "Ø 50 mm, Ti-6Al-4V"
     assert rows["Shot"]["balls"] == "30 of Ø 3 mm"
     assert rows["Chamber"]["diameter"] == "50 mm"
-    assert rows["Made with"]["part, sha256"] == load_result(folder).record.part_sha256
+    assert rows["To peen a part"]["2 fill"].startswith(rows["Shot"]["mass of these balls"][:4])
+    assert rows["To peen a part"]["3 peen"] == expected["peening time"]
     assert "Amplitude: 46 to 54 µm, ± 4 µm peak to valley" in rows["Tolerances"][""]
     assert "others are not known" in rows["Tolerances"][""]
     assert "was not checked" in rows["Warnings"][""]
@@ -191,6 +193,36 @@ def test_the_slit_round_the_sonotrode_is_in_the_dimensions(folder: Path) -> None
         is_round = "diameter 50 mm and a slit at both sides, at most 53 mm"
         assert told == (is_round if want.endswith("/0") else None)
     assert slit_limits(result) == {}
+
+
+@pytest.mark.parametrize(("length_mm", "jaws"), [(30.0, 0), (41.0, 0), (90.0, 4)])
+def test_jaws_are_drawn_where_the_part_stands_far_enough_out(
+    folder: Path, tmp_path: Path, length_mm: float, jaws: int
+) -> None:
+    """A bar along x in a box of 40 mm: inside, hardly out, and out by 25 mm at both sides."""
+    trimesh.creation.box((length_mm, 6.0, 6.0)).export(tmp_path / "bar.stl")
+    room = {"shape": "box", "length_mm": 40, "width_mm": 30, "height_mm": 30}
+    design = load_result(folder).design.changed({
+        "part": {"mesh": str(tmp_path / "bar.stl"), "unit": "mm"},
+        "chamber": {**room, "sonotrode_distance_mm": 10},
+    })  # fmt: skip
+    axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
+    told = draw_chamber(axes, build_chamber(design), 0.0, 100.0, (180.0, 100.0))
+    hatched = [one for one in axes.patches if one.get_hatch() and "\\" in one.get_hatch()]
+    assert len(hatched) == jaws
+    assert ("white and hatched: jaws" in told) == bool(jaws)
+
+
+def test_strips_are_peened_after_parts_and_twice_of_their_saturation(folder: Path) -> None:
+    result = load_result(folder)
+    for time, told in (
+        (Estimate(38.0, 12.0), "A strips after 9.5, 19, 38 and 76 s, for"),
+        (Estimate(38.0, math.inf, in_words=NOT_RESOLVED), "A strips at 4 or 5 times, for"),
+    ):
+        metrics = {**result.record.metrics, "saturation_time_s": time}
+        record = result.record.model_copy(update={"metrics": metrics})
+        rows = first_checks(replace(result, record=record)).rows
+        assert any(row[0].startswith(told) for row in rows)
 
 
 def test_an_intensity_off_the_usual_one_is_told_in_red(folder: Path) -> None:
