@@ -113,6 +113,8 @@ BREAK, WAVE = 0.5, 3.0  # mm, height and length of the waves of a line where the
 # mm on paper: jaws that hold the part outside begin so far from the wall, with so much of it beyond
 # them, and are so long and thick.
 JAWS_FROM, JAWS_LONG, JAWS_THICK = 2.5, 4.0, 2.0
+# They are drawn where the part's sides are parallel, at so many places, within so many mm on paper.
+JAW_PLACES, JAWS_OFF = 5, 0.2
 OFF_AXIS = 0.05  # mm: a section that is farther beside the axis has its place dimensioned
 ROOM, PART, TARGET = "#e8f1f7", "#c9ced3", KINDS["target"].colour
 RASTER = 200  # dots an inch, for the part in the plan
@@ -350,7 +352,7 @@ def _draw_breaks(axes: Axes, view: View, lines: np.ndarray) -> None:
 def _draw_jaws(axes: Axes, view: View, lines: np.ndarray) -> bool:
     """Draw jaws at both sides of a part, wherever it stands far enough out of the chamber.
 
-    Return whether there are any.
+    There its sides have to be parallel. Return whether there are any jaws.
 
     Args:
         lines: lines of the part's section, (k, 2, 2) [m].
@@ -367,19 +369,34 @@ def _draw_jaws(axes: Axes, view: View, lines: np.ndarray) -> bool:
         if min(drawn, stands_out) < JAWS_FROM + JAWS_LONG:
             continue
         start = wall + way * JAWS_FROM
-        at = ends[..., axis]
-        held = ((start < at) & (at < start + way * JAWS_LONG)).any(axis=1)
-        held |= (at[:, 0] > start) != (at[:, 1] > start)
-        if not held.any():
+        zone = np.linspace(start, start + way * JAWS_LONG, JAW_PLACES)
+        edges = [_across(ends, axis, place) for place in zone]
+        if not all(edges) or np.ptp(edges, axis=0).max() > JAWS_OFF:
             continue
-        has_jaws, across = True, ends[held][..., 1 - axis]
-        for edge, outwards in ((float(across.min()), -1.0), (float(across.max()), 1.0)):
+        has_jaws = True
+        for edge, outwards in zip(edges[0], (-1.0, 1.0), strict=True):
             corner = min(start, start + way * JAWS_LONG), min(edge, edge + outwards * JAWS_THICK)
             size = JAWS_LONG, JAWS_THICK
             x, wide = (corner, size) if axis == 0 else (corner[::-1], size[::-1])
             look: Any = {"facecolor": "white", "edgecolor": BLACK, "hatch": "\\\\\\\\", "lw": 0.7}
             axes.add_patch(Rectangle(x, *wide, **look))
     return has_jaws
+
+
+def _across(ends: np.ndarray, axis: int, place: float) -> tuple[float, ...]:
+    """Return where lines first and last cross a place along an axis of the page; () if none does.
+
+    Args:
+        ends: of the lines on the page, (k, 2, 2) [mm].
+    """
+    one, two = ends[:, 0], ends[:, 1]
+    crossing = (one[:, axis] > place) != (two[:, axis] > place)
+    one, two = one[crossing], two[crossing]
+    if not len(one):
+        return ()
+    share = (place - one[:, axis]) / (two - one)[:, axis]
+    places = (one + share[:, None] * (two - one))[:, 1 - axis]
+    return float(places.min()), float(places.max())
 
 
 def _draw_fixtures(axes: Axes, chamber: Chamber, view: View, at: float) -> None:

@@ -63,9 +63,8 @@ class Floor(NamedTuple):
     lean: float = 0.0  # of the walls [degrees]; infinite if no sonotrode is large enough
     too_large: float = 0.0  # area of a floor for which no sonotrode is large enough [m²]
     offset_mm: tuple[float, float] = (0.0, 0.0)  # of the part, so that its target is on the axis
-    is_raised: bool = (
-        False  # whether the part is higher to stay clear of the face outside the walls
-    )
+    is_raised: bool = False  # so that the face stays clear of the part outside of the walls
+    is_low: bool = False  # with a ceiling so low that no ball gets above the part
     strips: Strips | None = None  # of the target, if one is peened after the other
 
     @property

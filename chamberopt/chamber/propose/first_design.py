@@ -72,6 +72,7 @@ from chamberopt.chamber.propose.proposed_room import (
     hanging_turns,
     place_room,
     room_reason,
+    under_low_ceiling,
 )
 from chamberopt.chamber.shop import Shop, usual_shop
 from chamberopt.common.errors import InputError, UnreadableError
@@ -422,6 +423,8 @@ def _proposed(given: _Given, stance: Stance, like: Proposal | None = None) -> Pr
                     )
                 why = {**reasons, **words, **floor_reasons(floor, goes_out, diameter)}
                 made = checked(own, why, floor, known, mesh, wanted.shop)
+                if is_local and turning is None:
+                    made, floor = under_low_ceiling(made, floor, wanted.shop)
             except UnreadableError:
                 raise
             except InputError as error:

@@ -220,7 +220,9 @@ def checked(
     found = tuple(warnings(design, chamber))
     if math.isinf(floor.lean):
         found = (DesignWarning(WarningKind.WIDE_FLOOR, f"chamber: {floor.reason}"), *found)
-    ranges = propose_ranges(sizes, mass_g, 1e3 * diameter, ball_mass)
+    ranges = propose_ranges(sizes, mass_g, 1e3 * diameter, ball_mass, floor.is_raised)
+    if floor.is_low:
+        del ranges["chamber.height_mm"]
     return Proposal(
         design=design,
         tables=tables,
@@ -359,7 +361,7 @@ def propose_charge(floor: float, diameter: float, ball_mass: float) -> Charge:
 
 
 def propose_ranges(
-    sizes: Sizes, mass_g: float, ball_mm: float, ball_mass: float
+    sizes: Sizes, mass_g: float, ball_mm: float, ball_mass: float, is_raised: bool = False
 ) -> dict[str, Range]:
     """Return the range of each number that the proposed study varies, by dotted name.
 
@@ -368,13 +370,14 @@ def propose_ranges(
         mass_g: mass of all balls together.
         ball_mm: ball diameter.
         ball_mass: mass of one ball [kg].
+        is_raised: whether nearer to the sonotrode its face would hit what is outside of the walls.
     """
     distance, height = round(1e3 * sizes.distance), round(1e3 * sizes.height)
     # Where the part is held outside, the ceiling stays near the place at which it goes out.
     least, most_mm = (
         (0.75, height + round(0.25 * distance)) if sizes.through_ceiling else (0.4, LARGEST_MM)
     )
-    near = max(round(least * distance), math.ceil(2.0 * ball_mm))
+    near = distance if is_raised else max(round(least * distance), math.ceil(2.0 * ball_mm))
     # The ceiling stays above the part even when the part is highest, so that no ball is caught.
     under = math.floor(height - 1e3 * sizes.top - 2.0 * ball_mm)
     far = max(distance, min(round(1.25 * distance), under))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from chamberopt.chamber.checks.place_names import SIDE_WALL
+from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.layout.end import Shape, can_be_clamped, local_room
 from chamberopt.chamber.layout.floor import (
     OUTSIDE,
@@ -21,8 +24,15 @@ from chamberopt.chamber.layout.floor import (
 from chamberopt.chamber.layout.pose import Turns, end_to_wall, hanging_pose, square_to_walls
 from chamberopt.chamber.layout.sizes import middle_in_plan, propose_sizes, shape_for
 from chamberopt.chamber.layout.target import Target
-from chamberopt.chamber.propose.proposal import Proposal, Tables, Wanted
-from chamberopt.chamber.shop import usual_shop
+from chamberopt.chamber.propose.proposal import (
+    Proposal,
+    Tables,
+    Wanted,
+    checked,
+    faults,
+    touched_share,
+)
+from chamberopt.chamber.shop import Shop, usual_shop
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.heights import lowest_over, points_up_to
 from chamberopt.geometry.meshes.part_mesh import PartMesh
@@ -31,6 +41,8 @@ from chamberopt.geometry.triangles import rotation_matrix
 AT_WALL = 2.0  # ball diameters from the target to the wall through which its end goes out
 OVER_RIM = (0.0, 2.5e-3, 5e-3)  # m over the ceiling at which a clamp may begin, as over a flange
 ROUND = 1.1  # largest diameter of a round target over its least side
+LOW = (0.25, 0.5, 1.0)  # ball diameters from the target to a low ceiling
+SAME_SHARE = 0.005  # of the target that a low ceiling may keep from the balls
 AMPLITUDE_UM = 40.0  # zero-to-peak; the nearest that the sonotrode can set is taken
 BETWEEN = "a plate that fits between the faces of the part, like the two walls beside them"
 CUT_OUT = "plates, cut out round it"
@@ -121,6 +133,34 @@ def place_room(
     if is_local and any(one.sizes.closed != ("z",) for _, one in found):  # not by a lid alone
         found = [one for one in found if one[1].sizes.shape == "box"] or found
     return min(found, key=lambda one: one[1].excess)
+
+
+def under_low_ceiling(made: Proposal, floor: Floor, shop: Shop | None) -> tuple[Proposal, Floor]:
+    """Return a proposal whose ceiling is so low that no ball gets above the part, and its floor.
+
+    Where a part that slopes down to a wall goes out through it, balls gather over it, and rattle.
+    The proposal stays as it is unless it has such a place, and fewer faults with a lower ceiling.
+    """
+    sloping = any(one.kind is WarningKind.REST and SIDE_WALL in one.about for one in made.warnings)
+    if not sloping or made.chamber.pieces_in_air or floor.sizes.closed:
+        return made, floor
+    part, before = made.chamber.part, touched_share(made)
+    top = float(part.vertices[part.triangles[part.target], 2].max())
+    for balls in LOW:
+        height_mm = 0.5 * math.ceil(2e3 * (top + balls * made.design.shot.diameter))
+        if height_mm >= made.tables["chamber"]["height_mm"]:
+            break
+        sizes = replace(floor.sizes, height=1e-3 * height_mm, through_ceiling=True)
+        low = floor._replace(sizes=sizes, is_low=True)
+        tables = {**made.tables, "chamber": {**made.tables["chamber"], "height_mm": height_mm}}
+        reason = "sonotrode to ceiling; so low that no ball lies or rattles over the part"
+        reasons = {**made.reasons, "chamber.height_mm": reason}
+        with suppress(InputError):
+            other = checked(tables, reasons, low, made.known, made.mesh, shop)
+            is_as_open = touched_share(other) >= before - SAME_SHARE
+            if is_as_open and faults(other) < faults(made):
+                return other, low
+    return made, floor
 
 
 def _is_round(posed: np.ndarray, part: Shape) -> bool:

@@ -17,6 +17,7 @@ from chamberopt.chamber.layout.shot_material import choose_shot
 from chamberopt.chamber.layout.sizes import Sizes
 from chamberopt.chamber.layout.target import Surface, propose_target, surfaces
 from chamberopt.chamber.part import chosen_triangles
+from chamberopt.chamber.propose import proposed_room
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.held_proposal import is_firm
 from chamberopt.chamber.propose.proposal import (
@@ -369,9 +370,13 @@ def test_the_weld_of_a_plate_is_peened_on_fewer_sonotrodes_than_the_plate(tmp_pa
 
 
 def test_a_fillet_that_looks_aslant_leaves_the_part_square_where_that_holds_it(
-    tmp_path: Path,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An angle of 60 x 120 mm whose fillet looks at 45 degrees: tilted, nothing clamps it."""
+    """An angle of 60 x 120 mm whose fillet looks at 45 degrees: tilted, nothing clamps it.
+
+    Under a low ceiling it would be clamped.
+    """
+    monkeypatch.setattr(proposed_room, "LOW", ())
     fillet = _fillet((0.011, 0.011), 0.004)
     outline = [(0, 0), (0.06, 0), (0.06, 0.007), *fillet[::-1], (0.007, 0.12), (0, 0.12)]
     mesh = Manifold.extrude(CrossSection([1e3 * np.array(outline)]), 40.0).to_mesh()
@@ -382,6 +387,27 @@ def test_a_fillet_that_looks_aslant_leaves_the_part_square_where_that_holds_it(
     assert not np.remainder(made.design.part.rotate_deg, 90.0).any()
     assert is_firm(made)
     assert touched_share(made) > 0.99
+
+
+def test_no_ball_gets_over_a_roof_between_two_walls(tmp_path: Path) -> None:
+    """An angle with its fillet down, both legs out through walls to which its upper sides slope."""
+    fillet = _fillet((0.015, 0.014), 0.006)
+    outline = [(0, 0), (0.062, 0), (0.062, 0.008), *fillet[::-1], (0.009, 0.036), (0, 0.036)]
+    mesh = Manifold.extrude(CrossSection([1e3 * np.array(outline)]), 30.0).to_mesh()
+    body = trimesh.Trimesh(1e-3 * mesh.vert_properties, mesh.tri_verts)
+    body.export(tmp_path / "angle.stl")
+    made = propose(tmp_path / "angle.stl", Wanted(unit="m", ball_mm=2.0), lambda _: [])
+    assert made.sonotrode_count == 1
+    assert "rattles over the part" in made.reasons["chamber.height_mm"]
+    assert not [one for one in made.warnings if one.kind is WarningKind.REST]
+    assert touched_share(made) > 0.99
+    assert [*made.bounds] == ["shot.mass_g"]  # no study raises the ceiling again
+
+
+def test_a_study_lowers_no_part_until_the_face_hits_what_is_outside() -> None:
+    sizes = Sizes("box", {}, 17e-3, 55e-3, 10e-3, False, 20e-3)
+    low = [propose_ranges(sizes, 5.3, 2.0, 2.5e-5, is_raised=one) for one in (False, True)]
+    assert [one["chamber.sonotrode_distance_mm"].low for one in low] == [7, 17]
 
 
 @pytest.mark.long
