@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from chamberopt.chamber.checks.calibration import misfit_texts
 from chamberopt.common.estimate import Estimate
+from chamberopt.common.number_text import percent
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.documents.coverage import change
@@ -22,6 +23,7 @@ from chamberopt.search.study.constraints import MET
 if TYPE_CHECKING:
     from chamberopt.results.load import Result
 
+JAMMED = 0.01  # least share of the shot's time, or of the impacts, in gaps that is told
 MOSTLY = 0.95  # share of the target from which on balls count as getting to all of it
 
 
@@ -105,11 +107,11 @@ def on_average(result: Result) -> str:
 def answer_lines(result: Result, start: Result | None = None) -> list[AnswerLine]:
     """Return sentences that qualify the answer.
 
-    The sentences say whether the time is enough and the wanted intensity there, how much less hard
-    a study's best chamber peens than the start, what each step does, which limits of zones and
-    constraints are met, and name doubts about the calibration.
+    The sentences say whether the time is enough, the shot free and the wanted intensity there, how
+    much less hard a study's best chamber peens than the start, what each step does, which limits of
+    zones and constraints are met, and name doubts about the calibration.
     """
-    lines = [*time_lines(result), *range_answer(result)]
+    lines = [*time_lines(result), *shot_lines(result), *range_answer(result)]
     lines += intensity_lines(result.design, result.metrics)
     lines += [
         *_ended_lines(result),
@@ -123,6 +125,27 @@ def answer_lines(result: Result, start: Result | None = None) -> list[AnswerLine
     return lines + [
         AnswerLine("calibration", f"{one[0].upper()}{one[1:]}.", True) for one in doubts if one
     ]
+
+
+def shot_lines(result: Result) -> Iterator[AnswerLine]:
+    """Yield warnings of balls that jam, and of a shot that had not settled."""
+    trapped = result.record.trapped
+    if trapped and max(trapped.rattling_time, trapped.rattling_impacts) >= JAMMED:
+        text = (
+            "Balls are held or rattle in gaps hardly wider than they are: "
+            f"{percent(trapped.rattling_time)} of the shot at any time, and "
+            f"{percent(trapped.rattling_impacts)} of the impacts on the part. The notes have the "
+            "place: choose other balls, or close or widen the gap."
+        )
+        yield AnswerLine("process", text, True)
+    if excess := result.record.first_half_excess:
+        text = (
+            "The shot had not settled when recording began: the target was dented by "
+            f"{percent(abs(excess))} {'more' if excess > 0.0 else 'less'} in the first half of the "
+            "simulated time than in the second. Simulate with a longer warm-up before this is "
+            "built."
+        )
+        yield AnswerLine("process", text, True)
 
 
 def _ended_lines(result: Result) -> Iterator[AnswerLine]:

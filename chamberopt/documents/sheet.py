@@ -15,14 +15,14 @@ from chamberopt.chamber.fixture import plugs_in_words, size_in_words
 from chamberopt.chamber.layout.pose import axis_down
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.key_words import in_words, key_in_words, title_with_unit, unit_of
-from chamberopt.common.number_text import estimate_text, percent, rounded
+from chamberopt.common.number_text import estimate_text, rounded
 from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.calibration import why_no_intensity
 from chamberopt.design.fixture import joint_in_words, slit_in_words, slit_mm
 from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
 from chamberopt.design.materials import alloys, find
 from chamberopt.design.tolerances import USUAL, USUAL_IN_WORDS, tolerance_box
-from chamberopt.documents.answer import answer, answer_lines
+from chamberopt.documents.answer import answer, answer_lines, shot_lines
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.ranges import time_at_slow_end
@@ -54,7 +54,6 @@ WIDEST_FACE = 90.0  # mm: larger faces need slots or are several (chamber/usual_
 SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wall is named by it
 EDGE, CLAMPED = 5e-5, 3e-3  # m: narrower openings are none; jaws take what stands out so far
 SAME_MM = 0.02  # lengths that differ by less count as equal
-JAMMED = 0.01  # least share of the shot's time, or of the impacts, in gaps that is told in red
 
 
 def alarms(result: Result) -> Iterator[str]:
@@ -78,22 +77,8 @@ def alarms(result: Result) -> Iterator[str]:
             f"Too few dents were simulated to resolve: {', '.join(unresolved)}. Simulate "
             "longer, or with more replicas, before this is built."
         )
-    trapped = result.record.trapped
-    if trapped and max(trapped.rattling_time, trapped.rattling_impacts) >= JAMMED:
-        yield (
-            "Balls are held or rattle in gaps hardly wider than they are: "
-            f"{percent(trapped.rattling_time)} of the shot at any time, and "
-            f"{percent(trapped.rattling_impacts)} of the impacts on the part. The report has the "
-            "place: choose other balls, or close or widen the gap."
-        )
-    if excess := result.record.first_half_excess:
-        yield (
-            "The shot had not settled when recording began: the target was dented by "
-            f"{percent(abs(excess))} {'more' if excess > 0.0 else 'less'} in the first half of the "
-            "simulated time than in the second. Simulate with a "
-            "longer warm-up before this is built."
-        )
-    said = [*time_lines(result)[:1], *intensity_lines(result.design, result.metrics)]
+    said = [*shot_lines(result), *time_lines(result)[:1]]
+    said += intensity_lines(result.design, result.metrics)
     yield from (one.text for one in said if one.warns)
 
 

@@ -72,12 +72,28 @@ def time_standing(design: Design, time: Estimate) -> str:
     return NOT_MET if planned < times * time.low else NOT_DECIDED
 
 
-def enough_time(design: Design, metrics: Mapping[str, Estimate]) -> float | None:
-    """Return the least whole time [s] that is enough by `coverage_standing`; None if not known."""
-    time = metrics.get(TIME)
+def enough_time(
+    design: Design,
+    metrics: Mapping[str, Estimate],
+    planned: float = 0.0,
+    before: Mapping[str, Estimate] | None = None,
+) -> float | None:
+    """Return the least whole time [s] that is enough by `coverage_standing`; None if not known.
+
+    A time that was planned for other metrics, with a margin for what is not calibrated, keeps this
+    margin.
+
+    Args:
+        planned: that time [s].
+        before: those metrics; None if there are none.
+    """
+    time, then = metrics.get(TIME), (before or {}).get(TIME)
     if time is None or time.in_words or not 0.0 < time.high < math.inf:
         return None
-    return float(math.ceil(_times(design) * time.high))
+    enough = _times(design) * time.high
+    if then is not None and not then.in_words and 0.0 < then.high < math.inf:
+        enough = max(enough, planned * time.value / then.value)
+    return float(math.ceil(round(enough, 6)))
 
 
 def _times(design: Design) -> float:
@@ -112,9 +128,9 @@ def time_lines(result: Result) -> list[AnswerLine]:
     lines = [_of_process(f"{ENOUGH[standing]}: {text}.", is_short)]
     if time.value <= planned and result.record.ranges and slow_end_is_late(result):
         slow = (
-            "The peening time is enough as designed, but not at the slow end of what is not "
-            f"calibrated ({groups_text(result.record.ranges)}): there 95 % of the target's area is "
-            f"98 % covered after: {time_at_slow_end(result)}."
+            "It is not enough at the slow end of what is not calibrated "
+            f"({groups_text(result.record.ranges)}): there 95 % of the target's area is 98 % "
+            f"covered after {time_at_slow_end(result)}."
         )
         lines.append(_of_process(slow, True))
     return lines

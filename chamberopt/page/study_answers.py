@@ -72,7 +72,7 @@ def candidates_answer(folder: Path) -> dict[str, object]:
             "of": (of := first.get(trial.point, one.number)),
             "name": str(of) if of == one.number else f"{of} again",
             "kind": _kind(trial),
-            "is_start": trial.number == 0 and trial.stage == "search",
+            "is_start": _is_start(trial),
             "is_best": trial is best_trial,
             "standing": _standing(trial, best_trial, is_finished(folder)),
             "feasible": one.feasible,
@@ -123,7 +123,7 @@ def _standing(trial: Trial, best: Trial | None, is_over: bool) -> str:
     """Return what a candidate is to the study, beside what became of it; "" for nothing."""
     if trial is best:
         return "the best" if is_over else "the best so far"
-    return "the start" if trial.number == 0 and trial.stage == "search" else ""
+    return "the start" if _is_start(trial) else ""
 
 
 def _meanings(labels: Sequence[Label]) -> list[str]:
@@ -138,7 +138,8 @@ def candidate_answer(folder: Path, number: int, design: Design) -> dict[str, obj
         number: number of the candidate, from 1.
         design: the design whose chamber the page shows. `differs` names its values in which it is
             another than the study's design with the numbers of the candidate. `time` is the
-            peening time that is enough for the candidate, if the design has another, as values.
+            peening time that is enough for the candidate, with the margin that the study's has at
+            the start, if the design has another, as values.
 
     Raises InputError if there is no such candidate.
     """
@@ -162,17 +163,23 @@ def candidate_answer(folder: Path, number: int, design: Design) -> dict[str, obj
         "values": values,
         "numbers": [(title_with_unit(name), str(one)) for name, one in values.items()],
         "figures": list(dict(figures).items()),
-        "time": _time(trial, design, values),
+        "time": _time(trial, trials[0], design, values, inputs),
         "differs": [title_with_unit(name) for name in inputs.differences(design)],
     }
 
 
-def _time(trial: Trial, design: Design, values: dict[str, float | str]) -> dict[str, float]:
+def _time(
+    trial: Trial, first: Trial, design: Design, values: dict[str, float | str], inputs: StudyInputs
+) -> dict[str, float]:
     """Return the peening time that is enough for a candidate, by its key, or nothing.
 
     There is nothing if it is not known, or if the design with the candidate's numbers has it.
+
+    Args:
+        first: the first candidate, which is the start of a search.
     """
-    enough = enough_time(design, trial.metrics)
+    planned = float(inputs.study["design"]["process"]["treatment_time_s"])
+    enough = enough_time(design, trial.metrics, planned, first.metrics if _is_start(first) else {})
     now = values.get(TIME, design.process.treatment_time)
     return {} if enough is None or enough == now else {TIME: enough}
 
@@ -233,6 +240,10 @@ def _trials(folder: Path, inputs: StudyInputs) -> list[Trial]:
                 f"{log}:{line + 1}: damaged row; restore the file or run the study in a new folder"
             )
     return trials
+
+
+def _is_start(trial: Trial) -> bool:
+    return trial.number == 0 and trial.stage == "search"
 
 
 def _kind(trial: Trial) -> str:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Turns = tuple[float, float, float]
 Upright = Literal["standing", "lying", "on-edge"]
 """Which of a part's sizes is upright: its longest one, its shortest one, or that between."""
-Pose = Upright | Literal["turning"]
+Pose = Literal[Upright, "turning"]
 """A pose to ask for. A part turns about a level axis, round which its target looks the same."""
 AT_SIDE: tuple[Upright, ...] = ("lying", "on-edge")  # in which a part is held at its side
 TURNING: Literal["turning"] = "turning"

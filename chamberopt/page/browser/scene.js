@@ -109,9 +109,12 @@ function dimensions() {
     [[`${sign}${short(high[0] - low[0])} mm`, [0.5 * (low[0] + high[0]), low[1] - gap, -0.4 * gap]]]);
   show("depth", [0, 1, 0], isRound ? [] : dimension([low[0], low[1], 0], [low[0], high[1], 0], [-gap, 0, 0], size),
     isRound ? [] : [[`${short(across)} mm`, [low[0] - gap, 0.5 * (low[1] + high[1]), -0.4 * gap]]]);
+  // What of the part is outside of the walls may be lower: then the distance is at an edge of the chamber.
+  const set = Number(value("chamber.sonotrode_distance_mm") ?? a[2]), isOwn = Math.abs(set - a[2]) < 0.05;
+  const [x, y] = isOwn ? [b[0], a[1]] : [low[0], low[1]];
   show("height", upright, [...dimension([high[0], high[1], 0], [high[0], high[1], high[2]], [gap, 0, 0], size),
-    ...dimension([b[0], a[1], 0], [b[0], a[1], a[2]], [0, 0, 0], size)],
-  [[`height ${short(high[2])} mm`, [high[0] + gap, high[1], 0.8 * high[2]]], [`distance ${short(a[2])} mm`, [b[0], a[1], 0.5 * a[2]]]]);
+    ...dimension([x, y, 0], [x, y, set], [0, 0, 0], size)],
+  [[`height ${short(high[2])} mm`, [high[0] + gap, high[1], 0.8 * high[2]]], [`distance ${short(set)} mm`, [x, y, 0.5 * set]]]);
 }
 
 // Ends of the lines of a dimension between two places: arrows, aside by a way, and a line from each place to its arrow.

@@ -141,7 +141,7 @@ def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
     design = SimpleNamespace(calibration=calibration, process=process, steps=None)
     result: Any = SimpleNamespace(
         study=study,
-        record=SimpleNamespace(zones=zones, ranges=None),
+        record=SimpleNamespace(zones=zones, ranges=None, trapped=None, first_half_excess=None),
         metrics={
             metric: Estimate(0.12, 0.03),
             "tip.mean_coverage": Estimate(0.9, 0.02),

@@ -126,6 +126,14 @@ def test_the_least_whole_time_that_is_enough(percent: float | None, enough: floa
     assert coverage_standing(a_design(enough - 1.0, percent), time) != "met"
 
 
+def test_a_time_keeps_the_margin_of_another() -> None:
+    """120 s for 61 s, as friction may be higher: 54.2 s need as much more."""
+    time, then = ({"time_to_98_s": Estimate(one, 2.3)} for one in (54.2, 61.0))
+    assert enough_time(a_design(1.0), time, 120.0, then) == 107.0
+    assert enough_time(a_design(1.0), then, 120.0, then) == 120.0
+    assert enough_time(a_design(1.0), time, 40.0, then) == 57.0  # with too short a time, none
+
+
 @pytest.mark.parametrize(
     "time", [None, Estimate(9.0, math.inf), Estimate(9.0, 1.0, in_words="never")]
 )

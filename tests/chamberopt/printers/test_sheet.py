@@ -27,6 +27,7 @@ from chamberopt.design.fixture import LEAST_GAP_MM, joint_in_words, slit_mm, tig
 from chamberopt.design.intensity import WantedIntensity
 from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.design.sonotrode import Face
+from chamberopt.documents.answer import answer_lines
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Document, Section, Sentence, Table
 from chamberopt.documents.report import open_matters, open_warnings
@@ -474,6 +475,7 @@ def test_what_forbids_to_use_it_is_in_red(folder: Path) -> None:
     record = result.record.model_copy(update={"trapped": jammed})
     (told,) = [text for text in alarms(replace(result, record=record)) if "rattle" in text]
     assert "12 % of the shot at any time, and 48 % of the impacts" in told
+    assert told in [one.text for one in answer_lines(replace(result, record=record)) if one.warns]
     assert not any("settled" in text for text in alarms(result))
     lively = result.record.model_copy(update={"first_half_excess": 0.12})
     (told,) = [text for text in alarms(replace(result, record=lively)) if "not settled" in text]

@@ -233,7 +233,7 @@ async function choose(number) {
     return button;
   };
   const take = taking("take", "Take these numbers into the design", one.values), [time] = Object.values(one.time);
-  const timed = time ? [" ", taking("take-time", `Take them with ${time} s of peening, which are enough for it`, { ...one.values, ...one.time })] : [];
+  const timed = time ? [" ", taking("take-time", `Take them with ${time} s of peening, which suit its time to 98 %`, { ...one.values, ...one.time })] : [];
   const other = one.differs.length ? [element("p", { className: "warning", textContent: `The open design is not the one of this study: it differs in ${one.differs.slice(0, 4).join(", ")}${one.differs.length > 4 ? ` and ${one.differs.length - 4} more` : ""}. The chamber shown is that of the open design with these numbers.` })] : [];
   find("chosen-candidate").replaceChildren(element("h3", { textContent: `Candidate ${data.candidates[number - 1].name}` }),
     element("p", {}, WORDS[one.kind], ...(one.reason.length ? [": ", ...onPage(one.reason)] : [])), ...other,
