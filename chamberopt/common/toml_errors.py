@@ -31,6 +31,7 @@ SIMILARITY = 0.6
 MOST_PROBLEMS = 10  # problems listed in a message
 MAX_NAME_TEXT = 200  # characters of a field's name that a message repeats
 MAX_CHOICES = 8  # choices listed in a message
+BEGINNING = 3  # letters of a wrong name from which on the names that begin so are meant
 MAX_VALUE_TEXT = 60  # characters of a given value that a message repeats
 
 
@@ -60,13 +61,17 @@ def closest_name(name: str, known: Iterable[str]) -> str | None:
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return a hint for a wrong name: "did you mean 'x'?" or, without a similar name, all names.
 
-    A hint with a similar name also lists all names if they are few.
+    A hint with a similar name also lists all names if they are few. Where several names begin so,
+    it has all of these.
 
     If a dotted name begins with a known table, only names in this table are compared, because no
     other table has the same keys.
     """
     words, table = list(known), name.rpartition(".")[0]
     words = [one for one in words if table and one.rpartition(".")[0] == table] or words
+    longer = [one for one in words if one.lower().startswith(name.lower())]
+    if 1 < len(longer) <= MAX_CHOICES and len(name) >= BEGINNING:
+        return f"did you mean {' or '.join(map(repr, longer))}?"
     close = closest_name(name, words)
     allowed = f"allowed: {', '.join(words)}"
     if close is None:

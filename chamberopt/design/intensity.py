@@ -255,7 +255,7 @@ def usual_intensity(alloy: Alloy, thickness: float) -> WantedIntensity | None:
     is_thick = 1e3 * thickness > THICK_MM
     low, high = (round(INCH_MM * one, 2) for one in ranges[is_thick])
     edge = f"above {THICK_MM:.3g} mm" if is_thick else f"of {plain(1e3 * thickness, 2)} mm"
-    text = f"usual for {what} {edge} by {TABLE}"
+    text = f"usual for {what} {edge} under the target by {TABLE}"
     at_step = abs(1e3 * thickness - THICK_MM) < AT_STEP * THICK_MM
     if at_step and ranges[0] != ranges[1]:
         other = "-".join(f"{INCH_MM * one:.2g}" for one in ranges[not is_thick])

@@ -29,7 +29,7 @@ EVALUATIONS, SEARCH_HALF_WIDTH = 20, 0.04
 SEARCH_REPLICAS = 4
 # At the beginning of a clause of a reason: the clause is to be settled, unless a standard's name
 # begins it.
-TO_SETTLE = re.compile(r"[A-Z][A-Z-]+(?: [A-Z-]{2,})*\b")
+TO_SETTLE = re.compile(r"(?:A )?[A-Z][A-Z-]+(?: [A-Z-]{2,})*\b")
 STANDARD = "SAE "
 TARGET = "part.target"  # its reason begins with its name
 

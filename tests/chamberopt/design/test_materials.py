@@ -274,3 +274,8 @@ class TestFriction:
             InputError, match=rf"effects\.{key}: given 'smooth'; allowed: .*\"none\""
         ):
             design(tmp_path, change)
+
+
+def test_a_name_without_its_temper_is_answered_with_those_that_have_one() -> None:
+    with pytest.raises(InputError, match=r"did you mean '7075-T6' or .*'7075-T7351'"):
+        alloy("7075")

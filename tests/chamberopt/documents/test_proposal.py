@@ -13,6 +13,7 @@ from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.documents.proposal import (
     WIDTH,
     clauses,
+    matter_of,
     proposal_in_words,
     proposal_lines,
     time_in_words,
@@ -153,3 +154,8 @@ def test_a_time_has_the_unit_of_a_timer() -> None:
         "90 min",
         "4 h",
     ]
+
+
+def test_a_mark_may_begin_with_an_article() -> None:
+    one = matter_of("A HOLE THROUGH THE WALL, not plugged: close it")
+    assert (one.mark, one.text) == ("A HOLE THROUGH THE WALL", ", not plugged: close it.")

@@ -104,7 +104,9 @@ function draw() {
   const before = find("study-of").querySelector(".rows")?.scrollTop ?? 0;
   find("study-of").replaceChildren(...inOrder(), table(), ...overEach(axes, shares), ...(axes.length > 1 ? [...overTwo(axes), ...overAll()] : []),
     ...(data.objectives.length > 1 ? front() : []), ...(model?.check?.rows?.length ? check() : []));
-  find("study-of").querySelector(".rows").scrollTop = before;
+  const rows = find("study-of").querySelector(".rows"), row = rows.querySelector("tr.chosen"), foot = before + rows.clientHeight;
+  const isSeen = !row || (row.offsetTop - rows.querySelector("thead").offsetHeight >= before && row.offsetTop + row.offsetHeight <= foot);
+  rows.scrollTop = isSeen ? before : row.offsetTop - rows.clientHeight / 2;
 }
 
 // Every candidate as a row, a confirmation below the candidate that it confirms.

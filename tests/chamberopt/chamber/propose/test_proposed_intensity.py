@@ -343,7 +343,9 @@ def test_without_a_wish_the_expected_intensity_stands_beside_the_usual_one(
     )
     for value, beside in ((0.2, False), (0.26, True)):
         near = with_expected_intensity(made, PredictedIntensity(value, 0.05, 1.9, 2.5))
-        assert "0.15-0.25A are usual for titanium of 8 mm" in near.reasons[INTENSITY]
+        assert (
+            "0.15-0.25A are usual for titanium of 8 mm under the target" in near.reasons[INTENSITY]
+        )
         assert ("nothing but strips tells" in near.reasons[INTENSITY]) is beside
     assert "THIN" not in told
     wanted = usual_for(made)
@@ -374,7 +376,7 @@ def test_a_usual_intensity_is_aimed_at_and_is_no_wish(plate: Path, shop: Shop) -
     assert "chosen for the intensity" in free.reasons["sonotrode.amplitude_pv_um"]
     told = free.reasons[INTENSITY]
     assert told.startswith("predicted 0.")
-    assert "aimed at 0.15-0.25A, usual for titanium of 8 mm" in told
+    assert "aimed at 0.15-0.25A, usual for titanium of 8 mm under the target" in told
     assert f"# Almen intensity: {told}" in design_text(free, Path())
 
 
