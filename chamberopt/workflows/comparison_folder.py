@@ -140,11 +140,8 @@ def _draw_local(
     titles = []
     for label, one in zip(later, local, strict=True):
         low, high = (f"{radius:.1f}" for radius in one.radii)
-        over = (
-            ""
-            if high == "0.0"
-            else f"; averaged over {low if low == high else f'{low} to {high}'}\N{NO-BREAK SPACE}mm"
-        )
+        radii = high if low == high else f"{low} to {high}" if low != "0.0" else f"up to {high}"
+        over = f"; averaged over radii of {radii}\N{NO-BREAK SPACE}mm" if high != "0.0" else ""
         shares = f"more on {one.more:.0%}, less on {one.less:.0%} of the target{over}"
         shares = shares.replace("%", "\N{NO-BREAK SPACE}%")
         titles.append(f"{label} minus {first}\n{shares}")

@@ -49,6 +49,7 @@ CLEAR = 1.5  # distance of a mask from the target, over the diameter of a ball
 # Share of the target that a holder may keep from the balls; where no other holds the part.
 HIDDEN, MOST_HIDDEN = 0.005, 0.03
 LEAST_LEFT, MOST_LEFT = 0.005, 0.15  # share of the target that is left out if no ball touches it
+NARROW = 2.0  # ball diameters: the radius of hollows that balls hardly touch, at most
 MOSTLY, WHOLE = 0.5, 0.9  # share of what is left out, and of the target that names nothing of it
 NO_PLACE = (
     "no flat face beside the target looks up or aside and has room for a holder",
@@ -256,7 +257,8 @@ def _where_left(made: Proposal, left: np.ndarray) -> str:
         words.append(f"on {min(found)[1]}")
     if part.hollow is not None and left[hollow := part.hollow > 0.0].sum() > most:
         radius = 1.0 / float(np.average(part.hollow[hollow], weights=left[hollow]))
-        words.append(f"in hollows of about {1e3 * radius:.2g} mm")
+        if radius < NARROW * max(made.design.shot.diameters):  # wider ones keep no ball out
+            words.append(f"in hollows of about {1e3 * radius:.2g} mm")
     return f"mostly {' '.join(words)}, " if words else ""
 
 

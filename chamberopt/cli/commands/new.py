@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
@@ -169,7 +170,8 @@ def new(
         print_json({**asdict(words), "design": str(out / DESIGN), "studies": studies, **settings})
         return
     designs = [f"design in {out / name}" for name in (DESIGN, *done.settings)]
-    show([*designs, *(f"study in {out / name}" for name in done.studies)])
+    studies = [f"study in {out / name}" for name in done.studies]
+    show([*designs, *studies, f"next: chamberopt simulate {quote(str(out / DESIGN))}"])
 
 
 def _asked_unit(part: Path, sizes: Mapping[str, str]) -> str:
