@@ -404,6 +404,8 @@ class LocalRoom(NamedTuple):
     def as_low_as(self, sizes: Sizes, lowest: float) -> Sizes:
         """Return sizes for walls within which the part's lowest point is another one [m]."""
         more = self.lowest - lowest
+        if more and "z" in sizes.closed:
+            return replace(_under_lid(sizes, sizes.height + more), top=sizes.top + more)
         height = 1e-3 * math.ceil(1e3 * (sizes.height + more) - 1e-6)
         return replace(sizes, height=height, top=sizes.top + more) if more else sizes
 
@@ -477,10 +479,19 @@ def local_room(
         top=sizes.top - lowest,
     )
     if closes[1, 2]:
-        height = 1e-3 * _up_half_mm(sizes.distance + faces[1, 2] - lowest)
+        sizes = _under_lid(sizes, float(sizes.distance + faces[1, 2] - lowest))
         top = float(faces[1, 2] - lowest - BEHIND)
-        sizes = replace(sizes, height=height, through_ceiling=True, top=top)
+        sizes = replace(sizes, through_ceiling=True, top=top)
     return LocalRoom(sizes, walls, kept, lowest)
+
+
+def _under_lid(sizes: Sizes, height: float) -> Sizes:
+    """Return sizes of at least a height [m] up to the part's own lid, in half millimetres.
+
+    The part is as much higher, so that the wall ends at the lid without a slot.
+    """
+    half = 1e-3 * _up_half_mm(height)
+    return replace(sizes, height=half, distance=round(sizes.distance + half - height, 6))
 
 
 def _lengths(sizes: Sizes) -> np.ndarray:

@@ -366,6 +366,8 @@ def test_the_weld_of_a_plate_is_peened_on_fewer_sonotrodes_than_the_plate(tmp_pa
     assert made.tables["chamber"]["shape"] == "box"
     assert made.sonotrode_count == 2
     assert "z" in made.closed
+    lid = made.chamber.part.vertices[:, 2].max() - 0.008  # the plate's lower face
+    assert 0.0 <= made.chamber.height - lid < 0.25e-3
     assert made.design.shot.diameter <= 1e-3
 
 
