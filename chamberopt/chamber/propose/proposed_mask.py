@@ -186,7 +186,14 @@ def pads(mesh: PartMesh, target: np.ndarray, turns: Turns, ball: float) -> list[
     faces = mesh.faces(FLAT_DEG)
     up = faces.area_vectors @ rotation_matrix(turns)[2]
     level = faces.free_of(target) & (up > STRAIGHT_UP * faces.area) & (faces.area > ball * ball)
-    found = np.flatnonzero(level)
+    corners = mesh.vertices[mesh.triangles]
+
+    def width(face: int) -> float:
+        """Return the mean width of a face [m]; a facet along a round has hardly any."""
+        own = corners[faces.of_triangle == face].reshape(-1, 3)
+        return float(faces.area[face] / np.linalg.norm(np.ptp(own, axis=0)))
+
+    found = np.array([one for one in np.flatnonzero(level) if width(int(one)) > ball], dtype=int)
     found = found[np.argsort(-faces.area[found], kind="stable")][:MOST_PADS]
     keys = [{"at_mm": faces.place_mm(int(one)), "crease_deg": FLAT_DEG} for one in found]
     return [{"faces": one} for one in (keys, keys[:1])[: len(keys)] if one]

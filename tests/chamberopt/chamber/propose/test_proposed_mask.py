@@ -64,6 +64,17 @@ def test_a_pad_stands_on_level_tops_beside_the_target() -> None:
     assert pads(mesh, below, (0.0, 0.0, 0.0), 0.05) == []  # no ball finds room
 
 
+def test_no_pad_stands_on_a_facet_along_a_round() -> None:
+    """A bar of 20 mm that lies has 60 facets of 1 mm: a pad would be a needle."""
+    body = trimesh.creation.cylinder(0.01, 0.06, sections=60)
+    body.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 60.0, (0, 0, 1)))
+    triangles = body.faces.astype(np.int32)
+    mesh = PartMesh(body.vertices, triangles, number_by_position(len(triangles)), (), "", {})
+    ends = np.abs(body.face_normals[:, 2]) > 0.5
+    assert pads(mesh, ends, (90.0, 0.0, 0.0), 1.5e-3) == []
+    assert pads(mesh, ends, (90.0, 0.0, 0.0), 0.5e-3)
+
+
 def test_sharp_edges_are_those_of_the_target_that_turn_outwards() -> None:
     """A step of 8 on a base: a top of 40 x 40 mm has four outer edges, its inner ones are none."""
     base, step = trimesh.creation.box((80, 80, 8)), trimesh.creation.box((40, 40, 8))
