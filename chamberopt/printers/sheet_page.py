@@ -477,7 +477,8 @@ def _title_block(axes: Axes, fields: Sequence[Sequence[str]]) -> None:
         x, y = MARGIN + column * width, MARGIN + (1 - row) * ROW
         axes.add_patch(Rectangle((x, y), width, ROW, facecolor="none", edgecolor=BLACK, lw=0.5))
         top = Writer(axes, 5.5).write(name, x + 1.0, y + ROW - 0.8, width - 2.0, colour=DARK_GREY)
-        Writer(axes, 6.5, most=2).write(value, x + 1.0, top - 0.2, width - 2.0)
+        size = 6.5 if len(broken(value, width - 2.0, 6.5)) == 1 else 5.0  # two lines have room
+        Writer(axes, size, most=2).write(value, x + 1.0, top - 0.2, width - 2.0)
 
 
 def _save(path: Path, pages: Sequence[Figure], title: str) -> None:

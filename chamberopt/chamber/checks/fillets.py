@@ -51,7 +51,11 @@ def radii_of_target(design: Design, part: Part) -> list[float]:
     for one in chosen:
         faces = faces_of(mesh, one.border)
         face, _ = face_at(mesh, faces, one.border, 1e-3 * np.array(one.at_mm))
-        number = int(fillets.of_triangle[faces.of_triangle == face].min())
+        # Found by curvature, it may lack triangles at the border of the file's own face.
+        numbers, each = np.unique(
+            fillets.of_triangle[faces.of_triangle == face], return_counts=True
+        )
+        number = int(numbers[each.argmax()])
         if number < 0:
             return []
         found.add(float(f"{1.0 / fillets.curvature[number]:.3g}"))

@@ -1,5 +1,6 @@
 """Fillets and slots that are small for the shot."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,16 +8,19 @@ import pytest
 import trimesh
 from scipy.spatial import Delaunay
 
+from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import shot_reach
 from chamberopt.chamber.checks.fillets import (
     InnerEdges,
     facet_warnings,
     fillet_warnings,
     inner_edges,
+    radii_of_target,
     too_narrow,
 )
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
-from tests.helpers.synthetic import chamber_round
+from chamberopt.design.load import load_design
+from tests.helpers.synthetic import DESIGNS, chamber_round
 
 SIDES = 48
 
@@ -113,3 +117,24 @@ def test_a_curl_at_the_end_of_a_fillet_does_not_count(
     # An inner edge without a fillet always counts.
     bare = edges._replace(radius=np.zeros(2))
     assert too_narrow(bare, area, 0.8e-3 * larger).all()
+
+
+@pytest.mark.parametrize("radius_mm", [2.0, 5.0])
+def test_the_radius_of_a_fillet_that_is_the_target(tmp_path: Path, radius_mm: float) -> None:
+    """Of a hub on a plate, chosen as a fillet; by an angle of facets no radius is told."""
+    angle = np.radians(np.linspace(180.0, 270.0, 13))
+    round_ = np.c_[np.cos(angle), np.sin(angle)] * radius_mm + (15.0 + radius_mm, 8.0 + radius_mm)
+    profile = [(0, 0), (40, 0), (40, 8), *round_[::-1], (15, 40), (0, 40)]
+    trimesh.creation.revolve(profile, sections=72).export(tmp_path / "hub.stl")
+    middle = 15.0 + radius_mm * (1.0 - np.sqrt(0.5))
+    place = [middle, 0.0, 8.0 + radius_mm * (1.0 - np.sqrt(0.5))]
+    for key, found in (("fillet", [1e-3 * radius_mm]), ("alike", [])):
+        values = {
+            "part": {"mesh": str(tmp_path / "hub.stl"), "unit": "mm"}
+            | {"target": {"faces": [{"at_mm": place, key: True}]}},
+            "chamber": {"shape": "cylinder", "diameter_mm": 120, "height_mm": 80}
+            | {"sonotrode_distance_mm": 20},
+        }
+        design = load_design(DESIGNS / "plate.toml").changed(values)
+        part = build_chamber(design).part
+        assert radii_of_target(design, part) == pytest.approx(found, rel=0.02)
