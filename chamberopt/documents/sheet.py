@@ -53,6 +53,7 @@ TIME = "time_to_98_s"
 WIDEST_FACE = 90.0  # mm: larger faces need slots or are several (chamber/usual_shop.toml)
 SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wall is named by it
 EDGE, CLAMPED = 5e-5, 3e-3  # m: narrower openings are none; jaws take what stands out so far
+LEAST_SLIT_MM = 0.2  # of both sides of a face, by heart: it vibrates and must touch nothing
 SAME_MM = 0.02  # lengths that differ by less count as equal
 
 
@@ -278,8 +279,9 @@ def slit_limits(result: Result) -> dict[str, tuple[float, float, float]]:
     if face.diameter_mm is None:
         sides = {"length_mm": long, "width_mm": wide}
     slit = 2.0 * slit_mm(1e3 * min(result.design.ball_diameters))
+    least = min(LEAST_SLIT_MM, 0.5 * slit)
     return {
-        key: (side, side, side + slit)
+        key: (side, side + least, side + slit)
         for key, side in sides.items()
         if side is not None and abs(getattr(chamber, key, math.inf) - side) < SAME_MM
     }
@@ -413,7 +415,9 @@ def _fixtures(result: Result, built: AsBuilt) -> Iterator[Row]:
     if holder is not None and holder.kind == "bore":
         play = "tight"
         if holder.clearance_mm:
-            play = f"{plain(holder.clearance_mm)} mm of clearance all round"
+            play = (
+                f"{plain(holder.clearance_mm)} mm of clearance all round; openings are told without"
+            )
         yield "holder", f"the part itself, out through the wall, {play}"
     mask = result.design.mask
     if holder is None and not result.record.chamber.pieces_in_air:
@@ -537,8 +541,8 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
     yield "face in the chamber", _size(face_mm) + (f", {metal}" if metal else "")
     if limits := slit_limits(result):
         sides = [
-            f"{in_words(key)} {plain(low)} mm and a slit at both sides, at most {plain(high)} mm"
-            for key, (low, _, high) in limits.items()
+            f"{in_words(key)} {plain(low)} to {plain(high)} mm, so that it is clear of the face"
+            for key, (_, low, high) in limits.items()
         ]
         yield "wall round the face", "; ".join(sides)
     if face is not None and face.count > 1:

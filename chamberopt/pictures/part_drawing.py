@@ -261,7 +261,8 @@ def _with_limits(text: str, length: float, limits: Limits, *keys: str) -> str:
             down, up = value - low, high - value
             if abs(up - down) < 1e-9 * value:
                 return f"{text} ±{plain(up)}"
-            return f"{text} +{plain(up)}/{f'−{plain(down)}' if down else '0'}"
+            lower = f"{'−' if down > 0.0 else '+'}{plain(abs(down))}" if down else "0"
+            return f"{text} +{plain(up)}/{lower}"
     return text
 
 
