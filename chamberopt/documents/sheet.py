@@ -618,11 +618,10 @@ def _run(result: Result) -> Iterator[Row]:
         yield "1 mount", "the part and its drive; turn it once by hand: it touches no wall"
     else:
         yield "1 mount", "the part as above; measure from it to the face at rest"
-    masses = [f"{plain(_weighed_g(one.shot))} g" for one in design.in_steps.values()]
-    yield "2 fill", f"{masses[0]} of balls, weighed; close the chamber"
-    shares = [one.process.treatment_time for one in design.in_steps.values()]
+    steps = [*design.in_steps.values()]
+    yield "2 fill", f"{plain(_weighed_g(steps[0].shot))} g of balls, weighed; close the chamber"
     each = ", then ".join(
-        f"{plain(time)} s as step {number}" for number, time in enumerate(shares, 1)
+        f"{plain(one.process.treatment_time)} s as step {k}" for k, one in enumerate(steps, 1)
     )
     time = f"{plain(design.process.treatment_time)} s"
     yield "3 peen", f"{time}: {each} (see Steps)" if design.steps else time

@@ -338,11 +338,7 @@ def _draw_breaks(axes: Axes, view: View, lines: np.ndarray) -> None:
         (0, high[0] + sides, BEYOND),
         (1, high[1] + above, BEYOND),
     ):
-        one, two = ends[:, 0], ends[:, 1]
-        crossing = (one[:, axis] > edge + way) != (two[:, axis] > edge + way)
-        one, two = one[crossing], two[crossing]
-        share = (edge - one[:, axis]) / (two - one)[:, axis]
-        places = np.sort((one + share[:, None] * (two - one))[:, 1 - axis])
+        places = _crossings(ends, axis, edge, way)
         for start, end in places[: len(places) // 2 * 2].reshape(-1, 2):
             along = np.linspace(start, end, max(9, int(8.0 * (end - start) / WAVE)))
             wave = edge + BREAK * np.sin(2.0 * np.pi * (along - start) / WAVE)
@@ -371,8 +367,11 @@ def _draw_jaws(axes: Axes, view: View, lines: np.ndarray) -> bool:
             continue
         start = wall + way * JAWS_FROM
         zone = np.linspace(start, start + way * JAWS_LONG, JAW_PLACES)
-        edges = [_across(ends, axis, place) for place in zone]
-        if not all(edges) or np.ptp(edges, axis=0).max() > JAWS_OFF:
+        crossed = [_crossings(ends, axis, place) for place in zone]
+        if not all(map(len, crossed)):
+            continue
+        edges = [(float(one[0]), float(one[-1])) for one in crossed]
+        if np.ptp(edges, axis=0).max() > JAWS_OFF:
             continue
         has_jaws = True
         for edge, outwards in zip(edges[0], (-1.0, 1.0), strict=True):
@@ -384,20 +383,18 @@ def _draw_jaws(axes: Axes, view: View, lines: np.ndarray) -> bool:
     return has_jaws
 
 
-def _across(ends: np.ndarray, axis: int, place: float) -> tuple[float, ...]:
-    """Return where lines first and last cross a place along an axis of the page; () if none does.
+def _crossings(ends: np.ndarray, axis: int, place: float, beyond: float = 0.0) -> np.ndarray:
+    """Return where lines cross a place along an axis of the page, in order, (k,) [mm].
 
     Args:
-        ends: of the lines on the page, (k, 2, 2) [mm].
+        ends: of the lines on the page, (n, 2, 2) [mm].
+        beyond: how far beyond that place a line has to go on to count [mm].
     """
     one, two = ends[:, 0], ends[:, 1]
-    crossing = (one[:, axis] > place) != (two[:, axis] > place)
+    crossing = (one[:, axis] > place + beyond) != (two[:, axis] > place + beyond)
     one, two = one[crossing], two[crossing]
-    if not len(one):
-        return ()
     share = (place - one[:, axis]) / (two - one)[:, axis]
-    places = (one + share[:, None] * (two - one))[:, 1 - axis]
-    return float(places.min()), float(places.max())
+    return np.sort((one + share[:, None] * (two - one))[:, 1 - axis])
 
 
 def _draw_fixtures(axes: Axes, chamber: Chamber, view: View, at: float) -> None:

@@ -320,8 +320,7 @@ def draw_sheet(
     tall = drawing_height(chamber, (INNER, min(MOST_DRAWING, room) - CAPTION))
     shown, size, most, _ = _laid_out(*texts, [CAPTION + tall] * len(SIZES))
     alone = shown is whole
-    views = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall), limits, face)
-    Writer(axes, 6.0).write(f"{views}, {LEGEND}", MARGIN, top - tall, INNER, colour=DARK_GREY)
+    _drawing(axes, chamber, top, tall, limits, face)
     _content(Writer(axes, size, most), shown, top - tall - CAPTION)
     if not alone:
         measured = [one for one in content if one not in settings]
@@ -421,6 +420,19 @@ def _further_pages(section: Section, measured: Sequence[Block], name: str) -> It
         y -= 0.8 * write.line
 
 
+def _drawing(
+    axes: Axes, chamber: Chamber, top: float, tall: float, limits: Limits, face: Face | None
+) -> None:
+    """Draw a chamber as wide as the page, with its legend below.
+
+    Args:
+        top, tall: upper edge and height of the drawing [mm].
+        limits, face: those of draw_sheet.
+    """
+    views = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall), limits, face)
+    Writer(axes, 6.0).write(f"{views}, {LEGEND}", MARGIN, top - tall, INNER, colour=DARK_GREY)
+
+
 def _further_steps(
     chamber: Chamber, name: str, limits: Limits, face: Face | None
 ) -> Iterator[Axes]:
@@ -436,9 +448,7 @@ def _further_steps(
         if not any(one.shape == posed.shape and np.allclose(one, posed) for one in drawn):
             axes, y = _further_page(f"Step {number}", name)
             tall = drawing_height(room, (INNER, MOST_DRAWING))
-            views = draw_chamber(axes, room, MARGIN, y, (INNER, tall), limits, face)
-            text = f"{views}, {LEGEND}"
-            Writer(axes, 6.0).write(text, MARGIN, y - tall, INNER, colour=DARK_GREY)
+            _drawing(axes, room, y, tall, limits, face)
             drawn.append(posed)
             yield axes
 

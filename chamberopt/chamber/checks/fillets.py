@@ -44,7 +44,7 @@ def radii_of_target(design: Design, part: Part) -> list[float]:
     There are none if anything but fillets is chosen, or by other means than a place on each.
     """
     chosen, file = design.part.target.faces, part.file
-    if file is None or any(one.border not in ("fillet", "cad_face") for one in chosen):
+    if file is None or not chosen or any(isinstance(one.border, float) for one in chosen):
         return []
     mesh, found = file.as_read, set[float]()
     fillets = fillets_of(mesh)
