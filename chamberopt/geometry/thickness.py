@@ -204,9 +204,10 @@ def _in_plate(samples: Samples) -> np.ndarray:
     found = inside.copy()
     for one, two, away in _pairs(samples, 1.1 * RIM * radius):
         # The disc around ``two`` counts as RIM times as wide, so that it fills corners.
-        own = inside[two] & (away <= RIM * radius[two])
-        own &= np.einsum("ij,ij->i", samples.normal[one], samples.normal[two]) > SAME_SIDE
-        found[one[own]] = True
+        own = np.flatnonzero(inside[two] & (away <= RIM * radius[two]))
+        one, two = one[own], two[own]
+        cosine = np.einsum("ij,ij->i", samples.normal[one], samples.normal[two])
+        found[one[cosine > SAME_SIDE]] = True
     return np.asarray(found & np.isfinite(samples.thickness))
 
 
@@ -220,10 +221,11 @@ def border_distance(samples: Samples, radius: np.ndarray) -> np.ndarray:
     """
     least = np.full(len(samples.place), np.inf)
     for one, two, away in _pairs(samples, radius):
+        near = np.flatnonzero(away <= radius[one])
+        one, two, away = one[near], two[near], away[near]
         cosine = np.einsum("ij,ij->i", samples.normal[one], samples.normal[two])
         thick = samples.thickness[two] > BECOMES_THICK * samples.thickness[one]
         border = (np.abs(cosine) < SAME_SIDE) | ((cosine >= SAME_SIDE) & thick)
-        border &= away <= radius[one]
         np.minimum.at(least, one[border], away[border])
     return least
 

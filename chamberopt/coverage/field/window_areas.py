@@ -174,19 +174,44 @@ def _add_common_areas(area, point, piece, points, pieces, radius):  # type: igno
         cx = p[0] - a * n_t[0] - fold * (n_p[0] - cosine * n_t[0])
         cy = p[1] - a * n_t[1] - fold * (n_p[1] - cosine * n_t[1])
         cz = p[2] - a * n_t[2] - fold * (n_p[2] - cosine * n_t[2])
-        common = 0.0
-        for k in range(3):
-            m = (k + 1) % 3
-            ax, ay, az = corner[k, 0] - cx, corner[k, 1] - cy, corner[k, 2] - cz
-            bx, by, bz = corner[m, 0] - cx, corner[m, 1] - cy, corner[m, 2] - cz
-            common += _sector(
-                ax * ux + ay * uy + az * uz,
-                ax * vx + ay * vy + az * vz,
-                bx * ux + by * uy + bz * uz,
-                bx * vx + by * vy + bz * vz,
-                radius,
-            )
-        area[i] += pieces.touched[t] * abs(common)
+        ax, ay, az = corner[0, 0] - cx, corner[0, 1] - cy, corner[0, 2] - cz
+        bx, by, bz = corner[1, 0] - cx, corner[1, 1] - cy, corner[1, 2] - cz
+        ex, ey, ez = corner[2, 0] - cx, corner[2, 1] - cy, corner[2, 2] - cz
+        common = _common_area(
+            (ax * ux + ay * uy + az * uz, ax * vx + ay * vy + az * vz),
+            (bx * ux + by * uy + bz * uz, bx * vx + by * vy + bz * vz),
+            (ex * ux + ey * uy + ez * uz, ex * vx + ey * vy + ez * vz),
+            radius,
+        )
+        area[i] += pieces.touched[t] * common
+
+
+@jit
+def _common_area(one, two, three, radius):  # type: ignore[no-untyped-def]
+    """Return the common area of a circle of this radius round the origin, and of the triangle with
+    these corners (x, y).
+    """
+    # Many of the pairs are apart, which saves them three arcs.
+    if _is_beyond(one, two, three, radius):
+        return 0.0
+    if _is_beyond(two, three, one, radius) or _is_beyond(three, one, two, radius):
+        return 0.0
+    sectors = _sector(one[0], one[1], two[0], two[1], radius)
+    sectors += _sector(two[0], two[1], three[0], three[1], radius)
+    return abs(sectors + _sector(three[0], three[1], one[0], one[1], radius))
+
+
+@jit
+def _is_beyond(start, end, third, radius):  # type: ignore[no-untyped-def]
+    """Return True if the circle of `_common_area` and a triangle's third corner are on two sides of
+    the line through its other corners.
+    """
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    third_side = dx * (third[1] - start[1]) - dy * (third[0] - start[0])
+    centre_side = dy * start[0] - dx * start[1]
+    return centre_side * third_side < 0.0 and centre_side * centre_side >= radius * radius * (
+        dx * dx + dy * dy
+    )
 
 
 @jit

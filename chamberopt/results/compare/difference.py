@@ -79,9 +79,11 @@ def difference(
     count = len(after.pseudovalues)
     gap = (paired_difference if same_seeds else independent_difference)(after, before, confidence)
     paired = len(gap.pseudovalues) > 0  # one a pair; none from independent samples
-    found = Difference(
-        0.0 if abs(gap.value) < ZERO_TOLERANCE else gap.value, gap.half_width, paired
+    # The same twice differs by the rounding of its sums.
+    value, half_width = (
+        0.0 if abs(one) < ZERO_TOLERANCE else one for one in (gap.value, gap.half_width)
     )
+    found = Difference(value, half_width, paired)
     if not (after.has_number and before.has_number):
         return replace(found, half_width=math.inf, in_words="not known")
     if found.real or found.value == 0.0 or min(count, len(before.pseudovalues)) < 2:
