@@ -28,6 +28,7 @@ CONFIDENCE = 0.95
 # points come before.
 FIRST_OF_CALIBRATION = 16
 ZERO_TOLERANCE = 1e-12  # a smaller value is a rounding error of zero
+NOT_RESOLVED = "not resolved"  # words in place of a number that has too few dents
 
 
 @dataclass(frozen=True)

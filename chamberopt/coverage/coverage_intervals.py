@@ -248,7 +248,6 @@ def root_of_variance(variance: Estimate) -> Estimate:
 DENTS_FOR_MEAN, DENTS_FOR_PLACES = 3.0, 25.0
 LEAST_RESOLVED = 0.05
 ENOUGH = 1.2  # factor on the time that the dents so far foretell, because these dents scatter
-NOT_RESOLVED = "not resolved"
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from chamberopt.chamber.checks.calibration import misfit_texts
-from chamberopt.common.estimate import Estimate
+from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.number_text import percent
-from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.documents.coverage import change
 from chamberopt.documents.document import AnswerLine

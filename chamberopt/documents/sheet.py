@@ -13,10 +13,9 @@ from chamberopt.chamber.checks.openings import PLATE
 from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.fixture import plugs_in_words, size_in_words
 from chamberopt.chamber.layout.pose import axis_down
-from chamberopt.common.estimate import Estimate
+from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.key_words import in_words, key_in_words, title_with_unit, unit_of
 from chamberopt.common.number_text import estimate_text, rounded
-from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.calibration import why_no_intensity
 from chamberopt.design.fixture import joint_in_words, slit_in_words, slit_mm
 from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
@@ -37,7 +36,7 @@ from chamberopt.peening.strip_holder import why_no_strip
 from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
-    from chamberopt.chamber.checks.openings import Opening
+    from chamberopt.chamber.checks.openings import Mounting, Opening
     from chamberopt.chamber.checks.strips import StripOfTarget
     from chamberopt.chamber.fixture import Plug
     from chamberopt.design.fixture import Holder
@@ -55,6 +54,12 @@ SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wal
 EDGE, CLAMPED = 5e-5, 3e-3  # m: narrower openings are none; jaws take what stands out so far
 LEAST_SLIT_MM = 0.2  # of both sides of a face, by heart: it vibrates and must touch nothing
 SAME_MM = 0.02  # lengths that differ by less count as equal
+GUIDED = "guide it there in a bushing, stopped along its axis"  # of a part that turns
+MOUNTED: dict[Mounting, str] = {
+    "part goes in": "the part goes in from outside",
+    "wall goes over": "the wall goes over it from outside",
+    "split": "split the wall there",
+}
 
 
 def alarms(result: Result) -> Iterator[str]:
@@ -193,6 +198,7 @@ class AsBuilt(NamedTuple):
 
     face_mm: tuple[float, ...]  # of the sonotrode: a diameter, or two sides
     openings: Sequence[Opening] = ()  # through which the part goes out
+    mountings: Sequence[Mounting] = ()  # of each of them, if they are known
     strip: StripOfTarget | None = None  # if the target is peened a strip at a time
     plugs: Sequence[Plug] = ()  # of the mask
     usual: WantedIntensity | None = None  # Almen intensity of its metal and thickness
@@ -285,6 +291,16 @@ def slit_limits(result: Result) -> dict[str, tuple[float, float, float]]:
         for key, side in sides.items()
         if side is not None and abs(getattr(chamber, key, math.inf) - side) < SAME_MM
     }
+
+
+def _over_face(result: Result) -> str:
+    """Return in words along which sides of the chamber its walls end over a larger face."""
+    face, chamber = result.design.sonotrode.face, result.design.chamber
+    if face is None or face.diameter_mm is not None or chamber.shape != "box":
+        return ""
+    sides = zip(("length_mm", "width_mm"), face.sides_mm, strict=True)
+    over = [in_words(key) for key, side in sides if getattr(chamber, key) < side - SAME_MM]
+    return " and the ".join(over)
 
 
 def setting_tables(result: Result, built: AsBuilt) -> list[Table]:
@@ -423,12 +439,15 @@ def _fixtures(result: Result, built: AsBuilt) -> Iterator[Row]:
     if holder is None and not result.record.chamber.pieces_in_air:
         padded = mask is not None and mask.axis is not None and not openings
         out = "the mask clamps it" if padded else "the part goes out through the wall"
-        yield "holder", f"none: {out}{'' if padded else '; clamp it there'}"
-    rows = []
+        held = GUIDED if result.design.effects.part_turn else "clamp it there"
+        yield "holder", f"none: {out}{'' if padded else f'; {held}'}"
+    rows, held = [], "clamp it there" if result.design.effects.part_turn is None else GUIDED
     for number, way in enumerate(openings):
         frame = "" if number else " in the chamber's frame"
+        beyond = _beyond(way, openings, held)
+        mounted = f"; {MOUNTED[built.mountings[number]]}" if built.mountings else ""
         rows.append(
-            ("opening", f"{_of_opening(way)} at {_place(way)} mm{frame}; {_beyond(way, openings)}")
+            ("opening", f"{_of_opening(way)} at {_place(way)} mm{frame}; {beyond}{mounted}")
         )
     yield from _first(rows, "openings")
     faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
@@ -447,7 +466,7 @@ def _fixtures(result: Result, built: AsBuilt) -> Iterator[Row]:
             )
             text += f", from ({at}) mm along ({along}) in the chamber's frame"
         if holder is not None and name == "holder":
-            text += _flanges(holder)
+            text += _flanges(holder) + _grip(holder)
         chosen = faces[name]
         where = f" ({', '.join(chosen.surface)})" if chosen and chosen.surface != ("all",) else ""
         yield name, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part{where}"
@@ -461,6 +480,13 @@ def _flanges(holder: Holder) -> str:
     over = f", {plain(holder.grip_mm)} mm over it as a cup" if holder.grip_mm else ""
     size = f"Ø {plain(holder.diameter_mm)} × {plain(holder.thickness_mm)} mm"
     return f", with {ends} of the part, {size}{over}"
+
+
+def _grip(holder: Holder) -> str:
+    """Return in words how much of a collar is round the part, and how it holds; "" for others."""
+    if holder.kind != "collar" or not holder.grip_mm:
+        return ""
+    return f"; {plain(holder.grip_mm)} mm of it over the part: split, so that it clamps"
 
 
 def _of_opening(one: Opening) -> str:
@@ -507,12 +533,12 @@ def drawn_openings(built: AsBuilt) -> list[tuple[str, Opening]]:
     ][:MOST_ROWS]
 
 
-def _beyond(one: Opening, openings: Sequence[Opening]) -> str:
-    """Return in words how far the part stands out of an opening, and whether it is held there."""
+def _beyond(one: Opening, openings: Sequence[Opening], held: str) -> str:
+    """Return in words how far the part stands out of an opening, and whether it is `held` there."""
     if one.beyond < EDGE:
         return "the part fills it"
     farthest = max(other.beyond for other in openings)
-    clamp = ": clamp it there" if one.beyond >= min(CLAMPED, farthest) else ""
+    clamp = f": {held}" if one.beyond >= min(CLAMPED, farthest) else ""
     wider = ""
     if one.wider is not None:
         size = " × ".join(plain(round(1e3 * x, 1)) for x in one.wider)
@@ -545,6 +571,9 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
             for key, (_, low, high) in limits.items()
         ]
         yield "wall round the face", "; ".join(sides)
+    if over := _over_face(result):
+        gap = slit_in_words(1e3 * min(design.ball_diameters))
+        yield "walls over the face", f"at both ends of the {over}, clear of it by {gap}"
     if face is not None and face.count > 1:
         gap = slit_in_words(1e3 * min(design.ball_diameters))
         yield "gaps between the blocks", f"{gap}, half a ball"
@@ -766,10 +795,19 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
 def _strip_times(result: Result) -> str:
     """Return in words after which times strips are peened."""
     saturation = result.metrics.get("saturation_time_s")
-    if saturation is None or not saturation.has_number:
+    if saturation is None or not (saturation.has_number or _is_roughly_known(saturation)):
         return "at 4 or 5 times"
     *times, last = (rounded(share * saturation.value, 2) for share in STRIP_TIMES)
-    return f"after {', '.join(times)} and {last} s"
+    about = "" if saturation.has_number else "about "
+    return f"after {about}{', '.join(times)} and {last} s"
+
+
+def _is_roughly_known(saturation: Estimate) -> bool:
+    """Return whether a time that is not resolved suffices to choose the times of strips.
+
+    Strips at half of the time or at twice it still tell where the curve saturates.
+    """
+    return _is_unresolved(saturation) and 0.0 < saturation.bias < 0.5 * saturation.value
 
 
 def calibrated_to(result: Result) -> Iterator[Sentence]:

@@ -6,9 +6,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from chamberopt.common.estimate import Estimate
+from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.number_text import estimate_text
-from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.intensity import OUTSIDE, TOO_FEW, Comparison, PredictedIntensity
 from chamberopt.documents.document import AnswerLine
 from chamberopt.documents.ranges import groups_text, slow_end_is_late, time_at_slow_end

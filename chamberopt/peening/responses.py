@@ -17,8 +17,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from chamberopt.common.estimate import FIRST_OF_CALIBRATION, Estimate
-from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
+from chamberopt.common.estimate import FIRST_OF_CALIBRATION, NOT_RESOLVED, Estimate
 from chamberopt.coverage.metrics import ObjectiveFunction, find_metric
 from chamberopt.simulation.estimates import weighted_sum
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -119,8 +119,8 @@ OFF_AXIS = 0.05  # mm: a section that is farther beside the axis has its place d
 ROOM, PART, TARGET = "#e8f1f7", "#c9ced3", KINDS["target"].colour
 RASTER = 200  # dots an inch, for the part in the plan
 LEGEND = (
-    "dimensions in mm. Blue: target, in the plan also where it is hidden. Hatched or grey: part. "
-    "Orange: sonotrode."
+    "dimensions in mm, without a tolerance by ISO 2768-m. Blue: target, in the plan also where it "
+    "is hidden. Hatched or grey: part. Orange: sonotrode."
 )
 LABEL = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
 
@@ -186,17 +186,22 @@ def draw_chamber(
     """
     (low, high), has_jaws = _ends(chamber), False
     planes = section_planes(chamber)
-    scale, outside, needs = _fit(chamber, planes, size)
-    middle = top - 0.5 * size[1]
+    scale, outside, needs, is_below = _fit(chamber, planes, size)
+    deep = scale * (high - low)[1]
+    # The middle of the sections is that of their row, and the plan's that of its own.
+    of_plan = top - needs[1] + 0.5 * (ABOVE + BELOW + deep) if is_below else top - 0.5 * size[1]
+    middle = top - 0.5 * (needs[1] - ABOVE - BELOW - deep if is_below else size[1])
     x = left + 0.5 * (size[0] - needs[0])
-    tall, deep = (scale * (high - low)[k] for k in (2, 1))
+    tall, under = scale * (high - low)[2], x + BESIDE
     for name, plane, more in zip("AB", planes, outside, strict=False):
         axis = np.array([plane.right, 2])
         corner = np.array([x + BESIDE + more[0], middle - 0.5 * (tall + more[1]) + 1.0])
         view = View(plane.right, scale, corner, low[axis], high[axis], more)
         has_jaws |= _draw_section(axes, chamber, view, plane.at, name, limits)
         x = corner[0] + scale * (high - low)[plane.right] + more[0] + BESIDE
-    corner = np.array([x + BESIDE, middle - 0.5 * deep + 1.0])
+        if plane.right == 0:
+            under = corner[0]
+    corner = np.array([under if is_below else x + BESIDE, of_plan - 0.5 * deep + 1.0])
     view = View(0, scale, corner, low[:2], high[:2], np.zeros(2))
     _draw_plan(axes, chamber, view, planes, limits)
     dashed = [] if face is None else _draw_face(axes, chamber, view, face)
@@ -209,7 +214,12 @@ def draw_chamber(
 
 def drawing_height(chamber: Chamber, size: Point) -> float:
     """Return the height [mm] that the drawing of a chamber takes of a width and height."""
-    return float(_fit(chamber, section_planes(chamber), size)[2][1])
+    return float(_fit(chamber, section_planes(chamber), size).needs[1])
+
+
+def drawing_scale(chamber: Chamber, size: Point) -> float:
+    """Return the scale of the drawing of a chamber in a width and height [mm]."""
+    return _fit(chamber, section_planes(chamber), size).scale
 
 
 def _ends(chamber: Chamber) -> tuple[np.ndarray, np.ndarray]:
@@ -218,17 +228,27 @@ def _ends(chamber: Chamber) -> tuple[np.ndarray, np.ndarray]:
     return mm.min(axis=0), mm.max(axis=0)
 
 
-def _fit(
-    chamber: Chamber, planes: Sequence[SectionPlane], size: Point
-) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return the largest scale at which sections and plan of a cavity fit on a page.
+class _Arrangement(NamedTuple):
+    """How the views of a chamber lie on a page.
+
+    outside: how much of the part beyond the cavity is drawn in each section, to a side and upwards,
+        on the page, (n, 2) [mm].
+    needs: width and height of all views [mm].
+    is_below: the plan is below the sections, not beside them.
+    """
+
+    scale: float
+    outside: np.ndarray
+    needs: np.ndarray
+    is_below: bool
+
+
+def _fit(chamber: Chamber, planes: Sequence[SectionPlane], size: Point) -> _Arrangement:
+    """Return the arrangement with the largest scale at which sections and plan fit on a page.
 
     Args:
         planes: planes of the sections.
         size: width and height that the drawing may have [mm].
-    Returns:
-        The scale; how much of the part beyond the cavity is drawn in each section, to a side and
-        upwards, on the page, (n, 2) [mm]; and the width and height of all views [mm].
     """
     low, high = _ends(chamber)
     cavity, part = high - low, 1e3 * chamber.part.vertices
@@ -237,15 +257,22 @@ def _fit(
         (max(low[k] - least[k], most[k] - high[k]), most[2] - high[2])
         for k in (one.right for one in planes)
     ])  # fmt: skip
-    lengths = sum(cavity[one.right] for one in planes) + cavity[0]
     for scale in SCALES:
         outside = np.minimum(MOST_OUTSIDE, scale * beyond)
-        wide = scale * lengths + 2.0 * outside[:, 0].sum() + 2.0 * (len(planes) + 1) * BESIDE
-        above = outside[:, 1].max()
-        tall = max(scale * cavity[2] + above + FACE, scale * cavity[1]) + ABOVE + BELOW
-        if (np.array([wide, tall]) <= np.asarray(size)).all():
-            break
-    return float(scale), outside, np.array([wide, tall])
+        sections = scale * sum(cavity[one.right] for one in planes) + 2.0 * outside[:, 0].sum()
+        sections += 2.0 * len(planes) * BESIDE
+        plan = scale * cavity[0] + 2.0 * BESIDE
+        high, deep = scale * cavity[2] + outside[:, 1].max() + FACE, scale * cavity[1]
+        for is_below, wide, tall in (
+            (False, sections + plan, max(high, deep)),
+            (True, max(sections, plan), high + deep + ABOVE + BELOW),
+        ):
+            found = _Arrangement(
+                float(scale), outside, np.array([wide, tall + ABOVE + BELOW]), is_below
+            )
+            if (found.needs <= np.asarray(size)).all():
+                return found
+    return found._replace(is_below=False)
 
 
 def _with_limits(text: str, length: float, limits: Limits, *keys: str) -> str:

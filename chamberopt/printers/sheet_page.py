@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.checks.fillets import radii_of_target
-from chamberopt.chamber.checks.openings import find_openings
+from chamberopt.chamber.checks.openings import find_openings, mounting
 from chamberopt.chamber.checks.strips import strip_of_target
 from chamberopt.chamber.checks.usual import usual_for_target
 from chamberopt.chamber.fixture import plugs_of
@@ -42,6 +42,7 @@ from chamberopt.pictures.part_drawing import (
     draw_chamber,
     draw_openings,
     drawing_height,
+    drawing_scale,
 )
 from chamberopt.pictures.section import face_size_mm
 from chamberopt.printers.report_page import PageFile, require_free_page
@@ -66,6 +67,7 @@ SIZES = (8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0)  # pt of the text; the largest size 
 LEAST_ALONE = 6.5  # pt: with smaller letters than these on one page there are further pages
 # Height of the drawing with its caption [mm]: the least for each pt of the text, and the most.
 DRAWING_PER_PT, MOST_DRAWING = 13.0, 125.0
+LEAST_SCALE = 0.5  # of the first page's drawing, below which there is a larger one on its own page
 CAPTION, ROW = 7.0, 8.0  # mm, of the caption, and of a row of the title block
 FIELDS = 6  # in a row of the title block
 FOOT = MARGIN + 2.0 * ROW + 3.0  # mm, where the content ends
@@ -266,10 +268,12 @@ def write_sheet(
     path = require_free_page(loaded.folder / SHEET if path is None else path, SHEET_FILE)
     with claim_file(path):
         chamber = load_chamber(loaded)
-        design, part = loaded.design, chamber.part
+        design, part, openings = loaded.design, chamber.part, find_openings(chamber)
+        clear = 1e-3 * (design.holder.clearance_mm if design.holder else 0.0)
         built = AsBuilt(
             face_size_mm(chamber),
-            find_openings(chamber),
+            openings,
+            [mounting(part, one, clear) for one in openings],
             strip_of_target(design, part),
             plugs_of(design, part),
             usual_for_target(design, part),
@@ -293,7 +297,8 @@ def draw_sheet(
 ) -> list[Figure]:
     """Return a process sheet as figures of its pages.
 
-    The first page has a heading, sentences in red, a drawing of the chamber and the content. Each
+    The first page has a heading, sentences in red, a drawing of the chamber and the content. Where
+    its scale is small, a page of its own has a larger one. Each
     further step in which the part stands otherwise has a page with its drawing. The last page has
     the outlines of openings. Each page has the title block at its foot.
 
@@ -325,6 +330,12 @@ def draw_sheet(
     if not alone:
         measured = [one for one in content if one not in settings]
         pages += _further_pages(further, measured, sheet.name)
+    if drawing_scale(chamber, (INNER, tall)) < LEAST_SCALE:
+        last, y = _further_page("Drawing", sheet.name)
+        _drawing(
+            last, chamber, y, drawing_height(chamber, (INNER, y - FOOT - CAPTION)), limits, face
+        )
+        pages.append(last)
     pages += _further_steps(chamber, sheet.name, limits, face)
     if openings:
         last, y = _further_page("Openings", sheet.name)

@@ -8,8 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.common.estimate import CONFIDENCE, Estimate, normal_quantile, student_quantile
-from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
+from chamberopt.common.estimate import (
+    CONFIDENCE,
+    NOT_RESOLVED,
+    Estimate,
+    normal_quantile,
+    student_quantile,
+)
 from chamberopt.search.optimiser.gaussian_process import moderate_variances
 from chamberopt.search.optimiser.scalarisation import scalarise
 from chamberopt.search.optimiser.search_model import (

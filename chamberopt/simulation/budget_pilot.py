@@ -52,9 +52,7 @@ FEW = 40.0  # dents in the median of the narrowest windows; 25 are needed (propo
 # for a shot that still slows down.
 COLLISIONS, UNSETTLED = 2e6, 8e6
 ENOUGH = 30  # dents from which on they bound the time to 98 %
-# Share of the target in windows that tell an intensity roughly, and the error of its logarithm: of
-# connecting_rod, turbine_disc and vane it was 1.22, 1.0 and 1.33 times that of single places.
-ROUGH, ROUGH_LOG_SD = 0.2, 0.3
+ROUGH = 0.2  # share of the target in windows that tell an intensity roughly
 
 
 def _least_time(squares: float, hits: int, area_time: float) -> float:
@@ -182,6 +180,9 @@ def measure_budget(
     if not dents or not mean > 0.0:
         raise InputError(f"the shot hardly hits the target in {simulated:.3g} simulated s")
     resolved = _resolved(found)
+    intensity = PredictedIntensity.of(wide.metrics, design.calibration)
+    if wide.metrics["strength_um"].in_words:
+        intensity = rough_intensity(slow, chamber, executor, replicas)
     mean_time = slow.process.treatment_time / mean
     return Measured(
         dent_rate=dents / (simulated * slow.process.accuracy.gauge),
@@ -196,8 +197,7 @@ def measure_budget(
         mean_time=mean_time,
         warmup=warmup,
         settled=settled,
-        intensity=PredictedIntensity.of(wide.metrics, design.calibration)
-        or rough_intensity(slow, chamber, executor, replicas),
+        intensity=intensity,
     )
 
 
@@ -214,10 +214,7 @@ def rough_intensity(
     gauge = ROUGH * 1e6 * float(chamber.part.area[chamber.part.target].sum())
     wide = design.changed({"process.accuracy.gauge_mm2": max(1.0, gauge)})
     strength = _seen(wide, chamber, executor, replicas).metrics["strength_um"]
-    if not strength.bias < ROUGH_LOG_SD * strength.value:
-        return None
-    error = Z * ROUGH_LOG_SD * strength.value
-    return PredictedIntensity.estimated(replace(strength, half_width=error, in_words=""))
+    return PredictedIntensity.roughly(strength)
 
 
 def _seen(

@@ -23,7 +23,13 @@ import numpy as np
 
 from chamberopt.chamber.build import TARGET
 from chamberopt.chamber.checks.gaps import MIN_MISSED_SHARE
-from chamberopt.common.estimate import Estimate, estimate, shared_half_width, sum_of_shared
+from chamberopt.common.estimate import (
+    NOT_RESOLVED,
+    Estimate,
+    estimate,
+    shared_half_width,
+    sum_of_shared,
+)
 from chamberopt.common.number_text import plain, share_in_words
 from chamberopt.coverage.coverage_from_impacts import (
     Prints,
@@ -32,12 +38,7 @@ from chamberopt.coverage.coverage_from_impacts import (
     kept_footprints,
     locate_dents,
 )
-from chamberopt.coverage.coverage_intervals import (
-    NOT_RESOLVED,
-    Resolution,
-    coverage_estimates,
-    find_resolution,
-)
+from chamberopt.coverage.coverage_intervals import Resolution, coverage_estimates, find_resolution
 from chamberopt.coverage.field.surface_points import CERTAIN, RULE_OF_THREE, Reach
 from chamberopt.coverage.field.target_field import Gauge, TargetField
 from chamberopt.coverage.metrics import (

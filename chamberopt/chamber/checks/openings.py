@@ -12,6 +12,8 @@ import numpy as np
 
 from chamberopt.chamber.checks.place_names import SIDE_WALL, surface_names
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL
+from chamberopt.geometry.outline import frame_along
+from chamberopt.geometry.solids import passes_opening
 from chamberopt.geometry.triangles import (
     area_vectors,
     connected_pieces,
@@ -23,6 +25,7 @@ from chamberopt.geometry.triangles import (
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.part import Part
 
 
 THIN = 5e-5  # m: sides of openings below it are none
@@ -40,6 +43,9 @@ PLATE = 0.01  # m outside a wall's inner face, in which the wall is, however thi
 Form = Literal["rectangle", "round", "other", "edge"]
 """How an opening is cut: as a rectangle, drilled, along the part's section, or the wall ends."""
 
+Mounting = Literal["part goes in", "wall goes over", "split"]
+"""How part and wall come together, from outside: or the wall is in two pieces there."""
+
 
 class Opening(NamedTuple):
     """An opening of a wall, filled by the part that goes out through it."""
@@ -55,6 +61,20 @@ class Opening(NamedTuple):
     outline: np.ndarray | None = None
     # Of the box round the part in the first PLATE outside, if that is wider than the opening [m].
     wider: tuple[float, float] | None = None
+
+
+def mounting(part: Part, opening: Opening, clear: float) -> Mounting:
+    """Return how a part comes into an opening of a wall.
+
+    A wall is split only if neither what is inside nor what is outside passes its opening.
+
+    Args:
+        clear: room between part and wall [m].
+    """
+    frame = frame_along(np.array(opening.way))
+    level = float(np.dot(opening.place, opening.way))
+    inside, outside = passes_opening(part.vertices @ frame.T, part.triangles, level, clear)
+    return "part goes in" if inside else "wall goes over" if outside else "split"
 
 
 class Joint(NamedTuple):

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from chamberopt.chamber.checks.openings import find_openings
+from chamberopt.chamber.checks.openings import find_openings, mounting
 from chamberopt.chamber.checks.place_names import CEILING, surface_names
 from chamberopt.chamber.layout.end import DEEP
 from chamberopt.chamber.layout.floor import Floor
@@ -18,7 +18,6 @@ from chamberopt.chamber.propose.proposed_mask import rows_of
 from chamberopt.chamber.shop import Shop
 from chamberopt.design.fixture import WIDEST_GAP, tight_gap_mm
 from chamberopt.geometry.outline import fitted_circle, frame_along
-from chamberopt.geometry.solids import passes_opening
 from chamberopt.geometry.triangles import unit_normals
 
 MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
@@ -84,22 +83,20 @@ def why_not_turned(made: Proposal) -> str:
 
 
 def _mounting(made: Proposal, clearance: float) -> str:
-    """Return how a part gets into a wall through which it goes out.
-
-    A ceiling is split only if neither what is below it nor what is above it passes its opening.
+    """Return how a part gets into the walls through which it goes out.
 
     Args:
         clearance: room between part and wall [m].
     """
-    part = made.chamber.part
-    if _sides_out(made) == ["+z"] and "z" not in made.closed:
-        ceiling = float(made.chamber.vertices[:, 2].max())
-        below, above = passes_opening(part.vertices, part.triangles, ceiling, clearance)
-        if below:
-            return "is in one piece there: the part goes in from above"
-        if above:
-            return "is in one piece there: it is put over the part from above"
-    return "is split there"
+    chamber = made.chamber
+    ways = {mounting(chamber.part, one, clearance) for one in find_openings(chamber)}
+    side = "above" if _sides_out(made) == ["+z"] else "outside"
+    if "split" in ways or not ways:
+        return "is split there"
+    how = f"the part goes in from {side}"
+    if "wall goes over" in ways:
+        how = f"it is put over the part from {side}"
+    return f"is in one piece there: {how}"
 
 
 def grips_poorly(made: Proposal) -> bool:

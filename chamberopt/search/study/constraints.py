@@ -8,9 +8,8 @@ from pydantic import Field
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
-from chamberopt.common.estimate import Estimate, student_quantile
+from chamberopt.common.estimate import NOT_RESOLVED, Estimate, student_quantile
 from chamberopt.common.toml_errors import Problem
-from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.coverage.metrics import find_metric, metric_names, metric_problem
 from chamberopt.design.design import Design
 from chamberopt.design.table_base import FileTable

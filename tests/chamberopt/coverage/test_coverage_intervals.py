@@ -9,13 +9,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pytest
 
-from chamberopt.common.estimate import Estimate, estimate, jackknife
+from chamberopt.common.estimate import NOT_RESOLVED, Estimate, estimate, jackknife
 from chamberopt.coverage.coverage_from_impacts import Batch, Footprints, in_batches, joined
 from chamberopt.coverage.coverage_intervals import (
     DENTS_FOR_MEAN,
     DENTS_FOR_PLACES,
     ENOUGH,
-    NOT_RESOLVED,
     Resolution,
     coverage_estimates,
     find_resolution,

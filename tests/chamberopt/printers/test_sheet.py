@@ -19,9 +19,8 @@ from chamberopt.chamber.checks.openings import Opening
 from chamberopt.chamber.checks.strips import StripOfTarget
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
-from chamberopt.common.estimate import Estimate
+from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.number_text import estimate_text
-from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.design.almen_strip import USUAL_K
 from chamberopt.design.fixture import LEAST_GAP_MM, joint_in_words, slit_mm, tight_gap_mm
 from chamberopt.design.intensity import WantedIntensity
@@ -46,7 +45,12 @@ from chamberopt.documents.sheet import (
 )
 from chamberopt.documents.wording import metric_label, plain
 from chamberopt.peening.tolerance_result import ToleranceResult, ToleratedFigure
-from chamberopt.pictures.part_drawing import draw_chamber, draw_openings, drawing_height
+from chamberopt.pictures.part_drawing import (
+    draw_chamber,
+    draw_openings,
+    drawing_height,
+    drawing_scale,
+)
 from chamberopt.pictures.section import cut, face_size_mm, inside, section_planes
 from chamberopt.printers.sheet_page import (
     HEIGHT,
@@ -734,3 +738,20 @@ def test_a_drawing_takes_no_more_height_than_its_views() -> None:
     assert height < 118.0
     assert drawing_height(chamber, (186.0, height)) == height
     assert drawing_height(chamber, (186.0, height - 1.0)) < height - 1.0
+
+
+def test_the_plan_is_below_the_sections_where_that_allows_a_larger_scale() -> None:
+    """Section and plan of a long room fit beside each other at 1:5, and below at 1:2."""
+    room = {"shape": "box", "length_mm": 200, "width_mm": 100, "height_mm": 60}
+    chamber_table = {**room, "sonotrode_distance_mm": 15}
+    design = plate_design().changed({"chamber": chamber_table})
+    chamber = build_chamber(design)
+    assert drawing_scale(chamber, (186.0, 70.0)) == pytest.approx(0.2)
+    assert drawing_scale(chamber, (186.0, 150.0)) == pytest.approx(0.5)
+    for tall in (70.0, 150.0):
+        page = Figure().add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, 186.0), ylim=(0.0, tall))
+        draw_chamber(page, chamber, 0.0, tall, (186.0, tall))
+        places = {text.get_text(): text.get_position() for text in page.texts}
+        plan, section = places["plan: x to the right, y up"], places["A–A: x to the right, z up"]
+        assert (plan[1] < section[1] - 20.0) == (tall > 100.0)
+        assert (plan[0] > section[0] + 20.0) == (tall < 100.0)

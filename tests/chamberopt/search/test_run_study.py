@@ -11,9 +11,9 @@ import pytest
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.scene import require_ball_count
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import NOT_RESOLVED
 from chamberopt.common.executor import SerialExecutor, local_executor
 from chamberopt.common.files import make_output_folder
-from chamberopt.coverage.coverage_intervals import NOT_RESOLVED
 from chamberopt.coverage.metrics import metric_names
 from chamberopt.design.load import load_design
 from chamberopt.results.load import load_result

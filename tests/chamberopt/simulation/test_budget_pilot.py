@@ -6,6 +6,7 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.propose.proposed_budget import TooSlowError
+from chamberopt.common.estimate import NOT_RESOLVED
 from chamberopt.common.executor import local_executor
 from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.simulation.budget_pilot import (
@@ -61,11 +62,13 @@ def test_a_rough_intensity_takes_few_dents() -> None:
         rough = rough_intensity(design, chamber, executor, list(known.replicas))
         longer = design.changed({"process.accuracy.simulated_time_s": 4.0})
         full = PredictedIntensity.of(evaluate(longer, chamber, executor, plan=plan).metrics, None)
-    assert PredictedIntensity.of(short.metrics, None) is None
-    assert rough is not None
+    of_places = PredictedIntensity.of(short.metrics, None)
+    assert short.metrics["strength_um"].in_words == NOT_RESOLVED
     assert full is not None
-    assert rough.value == pytest.approx(full.value, rel=0.4)
-    assert rough.factor > full.factor
+    for one in (rough, of_places):
+        assert one is not None
+        assert one.value == pytest.approx(full.value, rel=0.4)
+        assert one.factor > full.factor
 
 
 @pytest.mark.long

@@ -1,6 +1,7 @@
 """Openings through which the part goes out: bodies whose openings are known."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,13 @@ import trimesh
 from shapely import Polygon
 
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.checks.openings import find_openings, find_walls_in_holes, part_at_wall
+from chamberopt.chamber.checks.openings import (
+    Opening,
+    find_openings,
+    find_walls_in_holes,
+    mounting,
+    part_at_wall,
+)
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
 
@@ -39,6 +46,39 @@ def design_of(
     mask = None if plugs is None else {"plugs": True, "at": plugs}
     own = {"part": {**given, **part}, "chamber": chamber, "mask": mask}
     return validate(Design, {**data, **own})
+
+
+@pytest.mark.parametrize("way", [(0, 0, 1), (1, 0, 0), (0, -1, 0), (-0.6, 0.0, 0.8)])
+@pytest.mark.parametrize(
+    ("inside", "outside", "mounted"),
+    [
+        (4.0, 10.0, "part goes in"),
+        (10.0, 4.0, "wall goes over"),
+        (10.0, 10.0, "split"),
+        (4.0, 4.0, "part goes in"),
+    ],
+)
+def test_a_wall_is_split_only_where_neither_end_passes_its_opening(
+    inside: float, outside: float, mounted: str, way: tuple[float, float, float]
+) -> None:
+    """A round of 5 mm radius in the opening, with others inside and outside of it."""
+    body = trimesh.boolean.union(
+        [
+            trimesh.creation.cylinder(radius, segment=[(0, 0, 1e-3 * a), (0, 0, 1e-3 * b)])
+            for radius, a, b in (
+                (0.005, -10, 10),
+                (1e-3 * inside, -20, -9),
+                (1e-3 * outside, 9, 20),
+            )
+        ],
+        engine="manifold",
+    )
+    place = np.array([0.02, 0.01, -0.03])
+    turn = trimesh.geometry.align_vectors((0, 0, 1), way)
+    body.apply_transform(turn).apply_translation(place)
+    part = SimpleNamespace(vertices=np.array(body.vertices), triangles=np.array(body.faces))
+    opening = Opening("the wall", (0.01, 0.01), tuple(place), 0.02, way)
+    assert mounting(part, opening, 1e-4) == mounted
 
 
 def test_a_bar_through_both_side_walls_and_a_post_through_the_ceiling(tmp_path: Path) -> None:
