@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.estimate import Estimate
+from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.design.almen_strip import USUAL_K, USUAL_K_LOG_SD
 from chamberopt.design.calibration import Calibration
 from chamberopt.design.intensity import (
@@ -14,6 +14,7 @@ from chamberopt.design.intensity import (
     INSIDE,
     NOT_DECIDED,
     OUTSIDE,
+    ROUGH_LOG_SD,
     THICK_MM,
     THIN_MM,
     Comparison,
@@ -157,13 +158,33 @@ def test_the_whole_interval_decides(value: float, half_width: float, standing: s
 
 
 @pytest.mark.parametrize(
-    "strength", [Estimate(20.0, math.inf), Estimate(20.0, 1.0, in_words="x"), Estimate(0.0, 0.0)]
+    "strength",
+    [
+        Estimate(20.0, math.inf),
+        Estimate(20.0, 1.0, in_words="x"),
+        Estimate(0.0, 0.0),
+        Estimate(20.0, math.inf, bias=1.01 * ROUGH_LOG_SD * 20.0, in_words=NOT_RESOLVED),
+        Estimate(20.0, math.inf, in_words=NOT_RESOLVED),  # of so few replicas that none is known
+    ],
 )
-def test_no_intensity_is_made_of_a_strength_that_is_not_resolved(strength: Estimate) -> None:
+def test_no_intensity_is_made_of_a_strength_that_is_not_known(strength: Estimate) -> None:
     assert PredictedIntensity.of({"strength_um": strength}, None) is None
     found = Comparison.of((0.15, 0.20), {"strength_um": strength}, None)
     assert found.standing == NOT_DECIDED
     assert "too few dents" in found.predicted
+
+
+def test_a_strength_that_is_not_resolved_tells_the_intensity_roughly() -> None:
+    """Its logarithm is known to ROUGH_LOG_SD, and that of the usual constant to its own."""
+    resolved = PredictedIntensity.of({"strength_um": Estimate(20.0, 0.0)}, None)
+    unresolved = Estimate(20.0, math.inf, bias=1.0, in_words=NOT_RESOLVED)
+    found = PredictedIntensity.of({"strength_um": unresolved}, None)
+    assert resolved is not None
+    assert found is not None
+    assert found.value == resolved.value
+    log_sd = math.log(found.factor)
+    assert log_sd**2 == pytest.approx(math.log(resolved.factor) ** 2 + ROUGH_LOG_SD**2)
+    assert math.log(found.high / found.low) == pytest.approx(2.0 * 1.96 * log_sd)
 
 
 def test_an_estimate_far_off_is_outside_though_no_strip_was_measured() -> None:
