@@ -20,7 +20,7 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.cli import main
 from chamberopt.common import dask_cluster, versions
-from chamberopt.common.dask_cluster import DaskExecutor
+from chamberopt.common.dask_cluster import DaskExecutor, _require_scheduler
 from chamberopt.common.errors import ClusterLostError, InputError, WorkerLostError
 from chamberopt.common.executor import SerialExecutor, share
 from chamberopt.design.load import load_design, save_design
@@ -312,3 +312,9 @@ def test_tasks_that_the_cluster_cancels_give_the_reason() -> None:
         dask_cluster._copy_outcome(dask_future, future)
         with pytest.raises(kind, match=message):
             future.result()
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1", "tcp://:8786", "http://127.0.0.1:8786", ""])
+def test_an_address_without_scheme_host_or_port_is_not_looked_up(address: str) -> None:
+    with pytest.raises(ValueError, match="not of the form tcp://HOST:PORT"):
+        _require_scheduler(address)

@@ -10,7 +10,7 @@ from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.chamber.scene import build_scene, chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.results.load import Result
-from chamberopt.results.rebuild import rebuild_replica
+from chamberopt.results.rebuild import _identity, rebuild_replica
 from tests.helpers.results.short_plate import plate_result
 
 
@@ -31,3 +31,14 @@ def test_a_replica_has_the_scene_of_the_chamber_that_is_built(result: Result) ->
 def test_a_replica_that_is_not_there_is_refused(result: Result, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--replica: given 3; the result has 3, give 0 to 2"):
         rebuild_replica(result, 3)
+
+
+def test_impacts_are_alike_only_if_triangle_and_speed_are_the_same() -> None:
+    rng = np.random.default_rng(2)
+    triangle = rng.integers(0, 3, 2000)
+    speed = rng.choice(np.array([1.0, np.nextafter(np.float32(1.0), 2.0), 1e-3, 5.0]), 2000)
+    _, alike = np.unique(_identity(triangle, speed), return_inverse=True)
+    pairs = np.unique(
+        np.column_stack([alike, triangle, np.unique(speed, return_inverse=True)[1]]), axis=0
+    )
+    assert len(pairs) == len(np.unique(alike)) == 12

@@ -1,10 +1,14 @@
 """Piles of balls, and balls that meet while one is in contact."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from sim_core import Balls, Scene, pack_balls, simulate
+from sim_core.contact.ball_on_ball import _press
 from sim_core.effects.contact_mode import ASLEEP, JAMMED, ON_BALL
+from sim_core.numerics.vec3 import Vec3
 from tests.helpers.scenes.cavities import box
 from tests.helpers.scenes.contact_mode import (
     CAPTURE,
@@ -64,3 +68,14 @@ def test_another_balls_hit_wakes_it() -> None:
     expected = np.array([0.1 - DIAMETER + 0.05 * (1 - e) * v, 0.1 + 0.05 * (1 + e) * v])
     np.testing.assert_allclose(end.positions[:, 0], expected, rtol=1e-9)
     np.testing.assert_allclose(end.positions[:, 2], R, atol=TOUCH)
+
+
+@pytest.mark.parametrize("rubs", [False, True])
+def test_balls_press_each_other_by_what_their_accelerations_lack(rubs: bool) -> None:
+    """The one behind gains 3 and 30 m/s² on the other; with friction twice gravity is most."""
+    for ahead, pressed in ((-3.0, 3.0), (-30.0, 2.0 * 9.81 if rubs else 30.0)):
+        accelerations = np.array([[0.0, 1.0, 0.0], [ahead, 0.0, 0.0]])
+        contact = SimpleNamespace(acceleration=accelerations, gravity=Vec3(0.0, 0.0, -9.81))
+        friction = SimpleNamespace() if rubs else None
+        found = _press.py_func(friction, contact, 0, 1, Vec3(1.0, 0.0, 0.0))
+        assert found == pytest.approx(pressed)

@@ -17,6 +17,8 @@ from sim_core import (
     pack_balls,
     simulate,
 )
+from sim_core.effects.friction import new_friction_state, set_slip, set_spin, shift_spins
+from sim_core.numerics.vec3 import Vec3
 from sim_core.scene.invariants import energy, momentum
 from tests.helpers.scenes.cavities import FLOOR, WEIGHTLESS, box, uniform_restitution
 from tests.helpers.scenes.turning_parts import BODIES, PART, box_around
@@ -396,3 +398,25 @@ def test_a_mixed_gas_of_perfectly_rough_balls_shares_energy_with_its_spins() -> 
         own = (sizes == DIAMETERS[1]) == big
         for kind in (moving, spinning):
             assert kind[:, own].mean() == pytest.approx(share, rel=0.05)
+
+
+def test_a_balls_spin_and_slip_are_those_that_were_set_and_change_evenly() -> None:
+    """Set at 0.2 s; a spin takes the slip away, and each leaves the other balls alone."""
+    law = Friction(((0.1, 0.2),) * 3, (0.1, 0.2))
+    spins = np.arange(9.0).reshape(3, 3)
+    state = new_friction_state(law, spins, R, np.zeros(1, dtype=np.int64))
+    state.slips[:] = 8.0
+    spin, twist = np.array([1.0, 2.0, 3.0]), np.array([10.0, -20.0, 30.0])
+    slip, change = np.array([4.0, 5.0, 6.0]), np.array([-1.0, 7.0, 2.0])
+    before = [column.copy() for column in (state.spins, state.twists, state.slips)]
+    set_slip(state, 1, 0.2, Vec3(*slip), Vec3(*change))
+    assert state.slips[1] == pytest.approx([*(slip - 0.2 * change), *change])
+    np.testing.assert_array_equal(state.slips[[0, 2]], before[2][[0, 2]])
+    shift_spins.py_func(state, 0.5)
+    assert state.slips[1] == pytest.approx([*(slip + 0.3 * change), *change])
+    set_spin(state, 1, 0.2, Vec3(*spin), Vec3(*twist))
+    assert state.spins[1] == pytest.approx(spin - 0.2 * twist)
+    assert state.twists[1] == pytest.approx(twist)
+    assert not state.slips[1].any()
+    np.testing.assert_array_equal(state.spins[[0, 2]], before[0][[0, 2]])
+    np.testing.assert_array_equal(state.twists[[0, 2]], before[1][[0, 2]])

@@ -74,3 +74,13 @@ def test_a_blade_is_not_held_by_its_tip(
         assert found.metal == pytest.approx(1e-3 * larger * thick, rel=0.1)
         assert found.overhang == pytest.approx(1e-3 * larger * (long - 8.0 - middle), rel=1e-3)
         assert "THIN GRIP" in clauses(found.text)[1][0]
+
+
+@pytest.mark.parametrize(("share", "is_held"), [(0.07, False), (0.08, True)])
+def test_both_jaws_together_close_on_enough_of_what_stands_out(share: float, is_held: bool) -> None:
+    """Two sides of a bar, and a face without another one behind it; 15 % takes both sides."""
+    bar = trimesh.creation.box((60, 20, 20))
+    across, above = np.abs(bar.face_normals[:, 1]) > 0.9, bar.face_normals[:, 2] > 0.9
+    outside = np.where(across, share / 2.0, np.where(above, (1.0 - 2.0 * share) / 2.0, 0.0))
+    jaws = flat_jaws(1e-3 * bar.vertices, bar.faces, 0.015 * outside)
+    assert bool(jaws.text) == is_held
