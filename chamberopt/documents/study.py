@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
 
 ALGORITHMS = {"sobol": "spread evenly", "surrogate": "chosen by a model of those before"}
 NO_CONSTRAINTS = "There were no constraints."
+MANY_REFUSED = 0.4  # share of the candidates from which on the reason is told
 
 
 def question_section(result: Result) -> Section:
@@ -190,7 +192,8 @@ def tried_sentence(trials: Sequence[Trial]) -> str:
     search = [one for one in trials if one.stage != "confirm"]
     if not search:
         return "No candidate has been evaluated yet."
-    refused = sum(one.refused or one.highest is not None for one in search)
+    reasons = [one.reason for one in search if one.refused or one.highest is not None]
+    refused = len(reasons)
     simulated = sum(bool(one.goals) for one in search)
     again = sum(bool(one.goals) for one in trials) - simulated
     said = [f"{len(search)} proposed", f"{refused} refused by geometry before any simulation"]
@@ -199,7 +202,18 @@ def tried_sentence(trials: Sequence[Trial]) -> str:
         said.append(f"{others} that could not be simulated")
     if again:
         said.append(f"{again} confirmed with new seeds")
-    return f"{', '.join(said)}."
+    often = f" {_most_frequent(reasons)}" if refused > MANY_REFUSED * len(search) else ""
+    return f"{', '.join(said)}.{often}"
+
+
+def _most_frequent(reasons: Sequence[str]) -> str:
+    """Return a sentence on the reason, apart from its numbers, that most of the reasons have."""
+    alike: dict[str, list[str]] = {}
+    for one in reasons:
+        alike.setdefault(re.sub(r"[-−\d.,()]+", "", one), []).append(one)
+    most = max(alike.values(), key=len)
+    text = most[0].removeprefix("not simulated: ")
+    return f"For {len(most)} of {len(reasons)} refusals it is the same reason, as: {text}."
 
 
 def evaluated(one: Trial, label: Label) -> EvaluatedCandidate:

@@ -57,14 +57,24 @@ def a_model(mean: list[float], half_width: list[float]) -> ModelRecord:
 
 def test_a_sentence_says_what_became_of_each_candidate() -> None:
     def trial(stage: str = "search", **other: object) -> Trial:
-        values = {"stage": stage, "goals": (), "refused": False, "highest": None, **other}
+        values = {"stage": stage, "goals": (), "refused": False, "highest": None, "reason": ""}
+        values |= other
         return SimpleNamespace(**values)  # type: ignore[return-value]
 
     simulated = {"goals": (Estimate(0.5, 0.1),)}
     trials = [trial(**simulated), trial(refused=True), trial(highest=0.4, refused=True), trial()]
+    trials += [trial(), trial()]
     assert tried_sentence([*trials, trial("confirm", **simulated)]) == (
-        "4 proposed, 2 refused by geometry before any simulation, 1 simulated, "
-        "1 that could not be simulated, 1 confirmed with new seeds."
+        "6 proposed, 2 refused by geometry before any simulation, 1 simulated, "
+        "3 that could not be simulated, 1 confirmed with new seeds."
+    )
+    gaps = [
+        trial(refused=True, reason=f"not simulated: the gap at ({x}, -2.0) mm is {x} mm wide")
+        for x in (1.5, 27.0)
+    ]
+    assert tried_sentence([trial(**simulated), trial(refused=True, reason="other"), *gaps]) == (
+        "4 proposed, 3 refused by geometry before any simulation, 1 simulated. For 2 of 3 refusals "
+        "it is the same reason, as: the gap at (1.5, -2.0) mm is 1.5 mm wide."
     )
     assert tried_sentence([]) == "No candidate has been evaluated yet."
 
