@@ -444,11 +444,9 @@ def _fixtures(result: Result, built: AsBuilt) -> Iterator[Row]:
     rows, held = [], "clamp it there" if result.design.effects.part_turn is None else GUIDED
     for number, way in enumerate(openings):
         frame = "" if number else " in the chamber's frame"
-        beyond = _beyond(way, openings, held)
-        mounted = f"; {MOUNTED[built.mountings[number]]}" if built.mountings else ""
-        rows.append(
-            ("opening", f"{_of_opening(way)} at {_place(way)} mm{frame}; {beyond}{mounted}")
-        )
+        how = f"; {MOUNTED[built.mountings[number]]}" if built.mountings else ""
+        beyond = _beyond(way, openings, held, how)
+        rows.append(("opening", f"{_of_opening(way)} at {_place(way)} mm{frame}; {beyond}"))
     yield from _first(rows, "openings")
     faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
     for name, one in result.record.chamber.fixtures.items():
@@ -483,10 +481,13 @@ def _flanges(holder: Holder) -> str:
 
 
 def _grip(holder: Holder) -> str:
-    """Return in words how much of a collar is round the part, and how it holds; "" for others."""
-    if holder.kind != "collar" or not holder.grip_mm:
+    """Return in words how much of a collar or plate is round the part, and how it holds.
+
+    The text is empty for other holders.
+    """
+    if holder.kind not in ("collar", "plate") or not holder.grip_mm:
         return ""
-    return f"; {plain(holder.grip_mm)} mm of it over the part: split, so that it clamps"
+    return f"; {plain(holder.grip_mm)} mm of it round the part, in two halves that clamp it"
 
 
 def _of_opening(one: Opening) -> str:
@@ -533,17 +534,17 @@ def drawn_openings(built: AsBuilt) -> list[tuple[str, Opening]]:
     ][:MOST_ROWS]
 
 
-def _beyond(one: Opening, openings: Sequence[Opening], held: str) -> str:
-    """Return in words how far the part stands out of an opening, and whether it is `held` there."""
+def _beyond(one: Opening, openings: Sequence[Opening], held: str, mounted: str) -> str:
+    """Return in words how far the part stands out of an opening, and how it is held and mounted."""
     if one.beyond < EDGE:
-        return "the part fills it"
+        return f"the part fills it{mounted}"
     farthest = max(other.beyond for other in openings)
     clamp = f": {held}" if one.beyond >= min(CLAMPED, farthest) else ""
     wider = ""
     if one.wider is not None:
         size = " × ".join(plain(round(1e3 * x, 1)) for x in one.wider)
         wider = f"; it widens to {size} mm in the first {plain(1e3 * PLATE)} mm outside"
-    return f"the part stands out by {plain(1e3 * one.beyond, 2)} mm{clamp}{wider}"
+    return f"the part stands out by {plain(1e3 * one.beyond, 2)} mm{clamp}{mounted}{wider}"
 
 
 def key_row(key: str, value: Any) -> Row:
@@ -611,11 +612,11 @@ def _shot(result: Result) -> Iterator[Row]:
         sizes.append(("balls", f"{text}, {plain(mass, 3)} g" if several else text))
     yield from _first(sizes, "sizes")
     asked = _limited(result, "shot.mass_g", f"asked: {plain(shot.mass_g)} g")
-    yield "mass of these balls", f"{plain(_weighed_g(shot))} g ({asked})"
+    yield "mass of these balls", f"{plain(_weighed_g(shot), 3)} g ({asked})"
     for name, one in result.design.in_steps.items():
         if one.shot != shot:
             counts = (f"{count:,} of Ø {plain(1e3 * size)} mm" for size, count in one.shot.sizes)
-            yield f"balls, step {name}", f"{', '.join(counts)}: {plain(_weighed_g(one.shot))} g"
+            yield f"balls, step {name}", f"{', '.join(counts)}: {plain(_weighed_g(one.shot), 3)} g"
 
 
 def _weighed_g(shot: ShotTable) -> float:
@@ -648,7 +649,7 @@ def _run(result: Result) -> Iterator[Row]:
     else:
         yield "1 mount", "the part as above; measure from it to the face at rest"
     steps = [*design.in_steps.values()]
-    yield "2 fill", f"{plain(_weighed_g(steps[0].shot))} g of balls, weighed; close the chamber"
+    yield "2 fill", f"{plain(_weighed_g(steps[0].shot), 3)} g of balls, weighed; close the chamber"
     each = ", then ".join(
         f"{plain(one.process.treatment_time)} s as step {k}" for k, one in enumerate(steps, 1)
     )
@@ -674,11 +675,11 @@ def _expected(result: Result, usual: WantedIntensity | None) -> Iterator[Row]:
     if slow := time_at_slow_end(result):
         yield f"{metric_label(TIME).text}, at the slow end", slow
     wanted = result.design.process.intensity_mmA
+    rough = PredictedIntensity.of(result.metrics, calibration)
+    if wanted is None and rough is not None and "almen_intensity" not in result.metrics:
+        near = f"about {plain(rough.value, 2)} mmA, within a factor of {plain(rough.factor, 2)}"
+        yield "Almen intensity, roughly", near
     if wanted is None and usual is not None:
-        rough = PredictedIntensity.of(result.metrics, calibration)
-        if rough is not None and "almen_intensity" not in result.metrics:
-            near = f"about {plain(rough.value, 2)} mmA, within a factor of {plain(rough.factor, 2)}"
-            yield "Almen intensity, roughly", near
         yield "Almen intensity, usual", f"{_range_text(usual)}, {usual.text}"
     if wanted is None and (reason := why_no_intensity(calibration)):
         yield "", f"{reason[0].upper()}{reason[1:]}."
@@ -788,7 +789,7 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
     else:
         text = metric_label("almen_intensity").format(intensity)
         yield f"intensity by A strips at the target, {_strip_times(result)}", text
-    masses = {plain(_weighed_g(one.shot)): None for one in design.in_steps.values()}
+    masses = {plain(_weighed_g(one.shot), 3): None for one in design.in_steps.values()}
     yield "mass of the shot, before and after", f"{' g, then '.join(masses)} g before"
 
 

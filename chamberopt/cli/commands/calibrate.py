@@ -33,7 +33,7 @@ def calibrate(
     from chamberopt.common.executor import open_executor
     from chamberopt.documents.calibration import calibration_end
     from chamberopt.peening.measured import load_measured
-    from chamberopt.workflows.calibrate import calibrate_machine
+    from chamberopt.workflows.calibrate import MACHINE, calibrate_machine
 
     loaded, designs = load_measured(measured)
     with (
@@ -42,3 +42,5 @@ def calibrate(
     ):
         found, known = calibrate_machine(loaded, designs, folder, executor, TerminalTeller())
     console.print_result(calibration_end(found, known, verbose), folder, json, "calibration.json")
+    if not json:
+        console.show([f'next: in your designs, calibration = "{folder / MACHINE}"'])
