@@ -14,6 +14,9 @@ NEARLY_ALL = 1e-3  # words replace shares that are closer to 1
 MOST_NINES = 6
 ALIKE = 1e-9  # distance of the ends of a range over their size, below which it is rounding
 THIN_SPACE = "\u202f"  # gap between thousands, at which no line breaks
+NO_BREAK = "\u00a0"  # a blank at which no line breaks
+# Blanks of an interval, and between a number and its unit.
+_TOGETHER = r" (?=±|%)|(?<=±) |(?<=\d) (?=(?:[µmc]?m[²³]?|mmA|k?g|s|k?Hz|HB|MPa)(?!\w))"
 
 
 def estimate_text(
@@ -144,6 +147,11 @@ def typeset(text: str) -> str:
 
     text = re.sub(r"(?<![\d.,e])\d{5,}(?!e)", grouped, text).replace(" °", f"{THIN_SPACE}°")
     return re.sub(r"(?<!\w)-(?=\d)", "−", text)
+
+
+def held_together(text: str) -> str:
+    """Return a text in which no line ends within an interval, or before the unit of a number."""
+    return re.sub(_TOGETHER, NO_BREAK, text)
 
 
 def range_text(low: float, high: float, unit: str = "") -> str:

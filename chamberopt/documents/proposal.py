@@ -20,7 +20,7 @@ from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.text import TO_SETTLE, clauses, to_settle
 from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import in_words
-from chamberopt.common.number_text import plain, rounded
+from chamberopt.common.number_text import NO_BREAK, held_together, plain, rounded
 from chamberopt.documents.document import Table
 from chamberopt.geometry.triangles import areas
 from chamberopt.peening.strip import StripSize
@@ -338,11 +338,11 @@ def wrapped(text: str, indent: int) -> list[str]:
     """Return a text in lines of at most WIDTH columns, all but the first one indented."""
     leading = len(text) - len(text.lstrip())
     lines = textwrap.wrap(
-        text.strip(),
+        held_together(text.strip()),
         WIDTH,
         initial_indent=" " * leading,
         subsequent_indent=" " * indent,
         break_long_words=False,
         break_on_hyphens=False,
     )
-    return lines or [""]
+    return [one.replace(NO_BREAK, " ") for one in lines] or [""]

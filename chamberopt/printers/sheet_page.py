@@ -7,7 +7,6 @@ further pages.
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
@@ -23,6 +22,7 @@ from chamberopt.chamber.checks.usual import usual_for_target
 from chamberopt.chamber.fixture import plugs_of
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, write_bytes
+from chamberopt.common.number_text import held_together
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.sheet import (
     OUTLINES,
@@ -189,7 +189,7 @@ def broken(
     """
     lines, line = [], ""
     known = "".join(one if ord(one) in _letters(bold) else "?" for one in " ".join(text.split()))
-    text = re.sub(r" (?=±|%)|(?<=±) ", "\u00a0", known)
+    text = held_together(known)
     for word in text.split(" "):
         while text_width(word, size, bold) > width:
             room = next(

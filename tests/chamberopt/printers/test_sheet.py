@@ -727,6 +727,12 @@ def test_lines_are_broken_to_their_width() -> None:
     assert all(text_width(line, 8.0) <= 30.0 for line in lines)
     assert "".join(lines).replace("\u00a0", "").replace(" ", "") == text.replace(" ", "")
     assert any("12.3\u00a0±\u00a00.4\u00a0%" in line for line in lines)
+    units = "range 10.6 to 14.6 µm, then 2600 s on 3581 mm² at 5 m/s of 7 parts"
+    whole = ("14.6\u00a0µm,", "2600\u00a0s", "3581\u00a0mm²", "5\u00a0m/s")
+    for width in range(26, 60):
+        text = "\n".join(broken(units, float(width), 8.0, most=20))
+        assert all(one in text for one in whole)
+        assert "7\u00a0" not in text
     assert broken(100 * "word ", 20.0, 8.0)[-1].endswith("…")
     assert broken("工 gear\x1b\n1", 30.0, 8.0) == ["? gear? 1"]  # the font has no such letters
 
