@@ -2,14 +2,15 @@
 
     python benchmarks/mutants.py --seeds 20 --first 0
     python benchmarks/mutants.py --seeds 1 --first 7 --show
+    python benchmarks/mutants.py --seeds 20 --first 0 --wide
 
 Each seed draws a file of the program that has a file of tests of its own, and puts one fault into
 it: an operator or comparison becomes its opposite, a number grows by a half or to its successor, a
 term of a sum or a factor of a product is dropped, a condition is turned round. The tests of that
-file run on a copy of the program, without the fault and with it; a fault that they pass is
-missed. Faults that change nothing count as missed, so the share is a lower bound. Lines for people
-(messages, descriptions) get no faults. A fault in the simulator's compiled code takes minutes, as
-all is compiled anew.
+file run on a copy of the program, without the fault and with it; a fault that they pass is missed,
+with `--wide` only if all tests of their folder pass it too. Faults that change nothing count as
+missed, so the share is a lower bound. Lines for people (messages, descriptions) get no faults. A
+fault in the simulator's compiled code takes minutes, as all is compiled anew.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ OPPOSITES: dict[type[ast.AST], type[ast.AST]] = {
     ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.And: ast.Or, ast.Or: ast.And,
     ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
 }  # fmt: skip
-LONGEST_S = 600.0  # of the tests of a file; a fault that makes them longer is caught
+# Of the tests of a file, and of a folder; a fault that makes them longer is caught.
+LONGEST_S, LONGEST_OF_FOLDER_S = 600.0, 3600.0
 
 
 def mirrored(packages: tuple[str, ...]) -> list[tuple[Path, Path]]:
@@ -129,13 +131,18 @@ def drawn(seeds: range, packages: tuple[str, ...]) -> Iterator[tuple[int, Path, 
 
 
 def is_caught(copy: Path, own: Path, test: Path, text: str) -> bool:
-    """Whether the tests fail with the fault in the copy, which is mended afterwards."""
+    """Whether the tests fail with the fault in the copy, which is mended afterwards.
+
+    Args:
+        test: a file or a folder of tests.
+    """
     (copy / own).write_text(text, "utf-8")
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "1", str(test)]
+    workers, longest = ("1", LONGEST_S) if test.suffix else ("auto", LONGEST_OF_FOLDER_S)
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", workers, str(test)]
     environment = {**os.environ, "PYTHONPATH": str(copy)}
     try:
         ended = subprocess.run(
-            command, cwd=copy, env=environment, capture_output=True, timeout=LONGEST_S, check=False
+            command, cwd=copy, env=environment, capture_output=True, timeout=longest, check=False
         )
     except subprocess.TimeoutExpired:
         return True
@@ -149,6 +156,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--packages", default="chamberopt,sim_core")
+    parser.add_argument("--wide", action="store_true", help="ask the tests of the folder too")
     parser.add_argument("--show", action="store_true", help="tell the faults, run no tests")
     options = parser.parse_args()
     seeds = range(options.first, options.first + options.seeds)
@@ -161,11 +169,15 @@ def main() -> None:
                 shutil.copytree(ROOT / name, copy / name)
             shutil.copy(ROOT / "pyproject.toml", copy)
         for seed, own, test, text, fault in faults:
-            if not options.show and test not in passed:
-                if is_caught(copy, own, test, (ROOT / own).read_text("utf-8")):
-                    sys.exit(f"{test} fails without a fault")
-                passed.add(test)
-            caught = "not run" if options.show else is_caught(copy, own, test, text)
+            caught: bool | str = "not run"
+            for tests in () if options.show else (test, test.parent)[: 1 + options.wide]:
+                if tests not in passed:
+                    if is_caught(copy, own, tests, (ROOT / own).read_text("utf-8")):
+                        sys.exit(f"{tests} fails without a fault")
+                    passed.add(tests)
+                caught = is_caught(copy, own, tests, text)
+                if caught:
+                    break
             rows.append({"seed": seed, "file": own.as_posix(), "fault": fault, "caught": caught})
             print(*rows[-1].values(), sep="  ", flush=True)
     if not options.show:
