@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, cast
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.number_text import plain, with_interval
-from chamberopt.design.almen_strip import OVER_A, USUAL_K, USUAL_K_LOG_SD, StripType
+from chamberopt.design.almen_strip import OVER_A, USED_FOR, USUAL_K, USUAL_K_LOG_SD, StripType
 from chamberopt.design.materials import Alloy
 
 if TYPE_CHECKING:
@@ -192,6 +192,16 @@ class PredictedIntensity:
         """Return the prediction for something whose intensity is a multiple of this one."""
         low, value, high = (factor * one for one in (self.low, self.value, self.high))
         return replace(self, value=value, low=low, high=high)
+
+    @property
+    def is_for_n(self) -> bool:
+        """Whether strips of the type N are taken for it."""
+        return self.value < USED_FOR["N"][1]
+
+    @property
+    def on_n_strips(self) -> str:
+        """The arc height of an N strip in words."""
+        return f"{plain(OVER_A['N'] * self.value, 2)} mm on N strips"
 
     def standing(self, wanted: tuple[float, float]) -> str:
         """Return where the whole 95 % interval lies: INSIDE a range, OUTSIDE it, or NOT_DECIDED.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -29,7 +30,7 @@ from chamberopt.documents.report import limits_of_intervals, open_matters, open_
 from chamberopt.documents.study import exposed_target
 from chamberopt.documents.tolerances import sheet_rows
 from chamberopt.documents.wanted import intensity_lines, time_lines, wanted_rows
-from chamberopt.documents.wording import keys_in_words, metric_label, plain, value_text
+from chamberopt.documents.wording import keys_in_words, metric_label, per_cent, plain, value_text
 from chamberopt.documents.zones import turned
 from chamberopt.peening.strip import StripSize
 from chamberopt.peening.strip_holder import why_no_strip
@@ -53,6 +54,9 @@ WIDEST_FACE = 90.0  # mm: larger faces need slots or are several (chamber/usual_
 SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wall is named by it
 EDGE, CLAMPED = 5e-5, 3e-3  # m: narrower openings are none; jaws take what stands out so far
 LEAST_SLIT_MM = 0.2  # of both sides of a face, by heart: it vibrates and must touch nothing
+# What is for who designs: options of commands, and how well a rule is founded.
+OF_COMMANDS = r" \((?:[^()]*--[^()]*|no source read)\)"
+LEAST_MISSED = 5e-4  # share of the target out of reach that is told
 SAME_MM = 0.02  # lengths that differ by less count as equal
 GUIDED = "guide it there in a bushing, stopped along its axis"  # of a part that turns
 MOUNTED: dict[Mounting, str] = {
@@ -431,9 +435,7 @@ def _fixtures(result: Result, built: AsBuilt) -> Iterator[Row]:
     if holder is not None and holder.kind == "bore":
         play = "tight"
         if holder.clearance_mm:
-            play = (
-                f"{plain(holder.clearance_mm)} mm of clearance all round; openings are told without"
-            )
+            play = f"{plain(holder.clearance_mm)} mm of clearance all round, beyond the sizes below"
         yield "holder", f"the part itself, out through the wall, {play}"
     mask = result.design.mask
     if holder is None and not result.record.chamber.pieces_in_air:
@@ -500,9 +502,8 @@ def _of_opening(one: Opening) -> str:
         return f"round, Ø {plain(round(500.0 * sum(one.size), 1))} mm, in {wall}, its middle"
     size = f"{' × '.join(sides)} mm"
     if one.form == "other":
-        drawn = "" if one.outline is None else " (last page)"
-        section = f"along the part's section, within {size}, no rectangle{drawn}"
-        return f"{section}, in {wall}, its middle"
+        section = "along the part's section" if one.outline is None else "as on the last page"
+        return f"{section}, within {size}, in {wall}, its middle"
     return f"{size} in {wall}, its middle"
 
 
@@ -543,7 +544,7 @@ def _beyond(one: Opening, openings: Sequence[Opening], held: str, mounted: str) 
     wider = ""
     if one.wider is not None:
         size = " × ".join(plain(round(1e3 * x, 1)) for x in one.wider)
-        wider = f"; it widens to {size} mm in the first {plain(1e3 * PLATE)} mm outside"
+        wider = f"; it widens to {size} mm within {plain(1e3 * PLATE)} mm outside"
     return f"the part stands out by {plain(1e3 * one.beyond, 2)} mm{clamp}{mounted}{wider}"
 
 
@@ -656,7 +657,10 @@ def _run(result: Result) -> Iterator[Row]:
     time = f"{plain(design.process.treatment_time)} s"
     yield "3 peen", f"{time}: {each} (see Steps)" if design.steps else time
     yield "4 weigh", "the balls again: what lacks is in a gap or in the part"
-    yield "5 look", "at the target through a lens of 10 times: no place without dents"
+    missed = 1.0 - result.record.field.reachable_share
+    but = f" but the {per_cent(missed)} that no ball can touch: see Warnings"
+    look = "at the target through a lens of 10 times: no place without dents"
+    yield "5 look", look + (but if missed > LEAST_MISSED else "")
 
 
 def _expected(result: Result, usual: WantedIntensity | None) -> Iterator[Row]:
@@ -735,7 +739,7 @@ def _warnings(result: Result) -> Iterator[Row]:
     elif not (left := open_warnings(result)):
         yield "", "There are none."
     else:
-        yield from (("", keys_in_words(text)) for text in left)
+        yield from (("", re.sub(OF_COMMANDS, "", keys_in_words(text))) for text in left)
 
 
 def first_checks(result: Result, level_mm: int | None = None) -> Table:
@@ -772,25 +776,57 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
     share, after = result.metrics["mean_coverage"], f"the peening time, {plain(end, 3)} s"
     # If the mean coverage at the end is not resolved, its curve is not reliable either.
     if row and share.has_number:
+        over = ""
         if row.time_s < end:
-            share = Estimate(row.mean_coverage, row.half_width)
+            share, over = (
+                Estimate(row.mean_coverage, row.half_width),
+                _over_ranges(result, row.time_s),
+            )
             after = f"{plain(row.time_s, 3)} s"
-        yield f"mean coverage of the target after {after}", estimate_text(share, 100.0, "%")
+        text = estimate_text(share, 100.0, "%")
+        yield f"mean coverage of the target after {after}", f"{text}{over}"
     intensity = result.metrics.get("almen_intensity")
     if intensity is None:
-        strips = f"A strips {_strip_times(result)}, for chamberopt calibrate"
-        if level_mm is not None and not why_no_strip(design, StripSize()):
-            strips += f"; in the lid in place of the part, {level_mm} mm from the sonotrode"
         rough = PredictedIntensity.of(result.metrics, calibration)
-        known = "not known before: calibrates to mmA"
+        kind, known = "A", "not known before: calibrates to mmA"
         if rough is not None:
-            known = f"{plain(rough.value, 2)} mmA, within a factor of {plain(rough.factor, 2)}"
+            kind, spread = "N" if rough.is_for_n else "A", plain(rough.factor, 2)
+            known = rough.on_n_strips if rough.is_for_n else f"{plain(rough.value, 2)} mmA"
+            known += f", within a factor of {spread}, as impacts on the target would give"
+        strips = f"{kind} strips {_strip_times(result)}, for chamberopt calibrate"
+        if level_mm is not None and not why_no_strip(design, StripSize()):
+            strips += (
+                f"; in the lid in place of the part, {level_mm} mm from the sonotrode, facing it"
+            )
+        elif level_mm is not None:
+            strips += f"; no strip of {StripSize()} fits into the lid: a smaller one, or on a zone"
         yield strips, known
     else:
         text = metric_label("almen_intensity").format(intensity)
         yield f"intensity by A strips at the target, {_strip_times(result)}", text
     masses = {plain(_weighed_g(one.shot), 3): None for one in design.in_steps.values()}
     yield "mass of the shot, before and after", f"{' g, then '.join(masses)} g before"
+
+
+def _over_ranges(result: Result, time: float) -> str:
+    """Return in words what the mean coverage after a time [s] may be before a calibration.
+
+    The curve is that of the design, run through as much faster or slower as the mean exposure is at
+    the ends of its range. The text is empty if there is none.
+    """
+    ranges, exposure = result.record.ranges, result.metrics.get("exposure")
+    ends = None if ranges is None else ranges.figures.get("exposure")
+    if ends is None or exposure is None or not exposure.value > 0.0:
+        return ""
+    curve = result.record.coverage_against_time
+    times, shares = zip(
+        (0.0, 0.0), *((one.time_s, one.mean_coverage) for one in curve), strict=True
+    )
+    low, high = (
+        rounded(100.0 * float(np.interp(time * one.value / exposure.value, times, shares)), 2)
+        for one in (ends.low, ends.high)
+    )
+    return f" as designed, {low} to {high} % before calibration"
 
 
 def _strip_times(result: Result) -> str:

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
 MAX_WARNINGS = 4  # of one kind
 MIN_MISSED_SHARE = 0.005  # share of the target that is worth a warning
 
+FACING = -0.7  # cosine between normals below which two faces make a gap, not a corner
 MIN_FREE = 0.1  # ball diameters: smaller balls are no remedy
 NEW_SHAPE, CLOSED = "change the chamber's shape", "close it where it is not to be peened"
 Sides = tuple[str, str]  # the surfaces beside a gap
@@ -155,8 +156,13 @@ def surface_warnings(
         second_half = np.cumsum(touches.area[own][order]) > 0.5 * left
         diameter_mm = 2e3 * float(touches.radius[own][order][np.argmax(second_half)])
         remedy = f"balls of {diameter_mm:.2g} mm would fit half of that; or {remedy}"
+    where = ""
+    if touches.area[sharp].sum() > 0.5 * left:
+        faces = touches.area[sharp & (touches.cosine < FACING)].sum()
+        what = "gaps" if faces > 0.5 * touches.area[sharp].sum() else "corners or fillets"
+        where = f", most of it in {what} narrower than a ball"
     text = (
-        f"{left / whole:.1%} of {name} in the chamber ({mm2(left)}) cannot be touched by a "
+        f"{left / whole:.1%} of {name} in the chamber ({mm2(left)}{where}) cannot be touched by a "
         f"ball of {1e3 * reach.diameter:g} mm, however long it is peened: e.g. at {place} in the "
         f"chamber's frame; {remedy}"
     )

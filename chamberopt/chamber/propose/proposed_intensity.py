@@ -38,7 +38,6 @@ from chamberopt.chamber.propose.proposed_setting import (
 from chamberopt.chamber.shop import usual_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
-from chamberopt.design.almen_strip import OVER_A
 from chamberopt.design.intensity import (
     THIN_MM,
     Comparison,
@@ -50,7 +49,6 @@ from chamberopt.design.intensity import (
 from chamberopt.design.materials import alloy
 
 MOST_PILOTS = 5
-ON_N = 0.1016  # mmA: 0.004 in, below which N strips are taken (SAE J443)
 INTENSITY = "process.intensity_mmA"  # whose reason stands in a design without a wish too
 MOST_TRIED = 3  # larger sizes that pilots compare
 FURTHER = 2.0  # times as large as the proposed balls, where no intensity says how far
@@ -402,8 +400,8 @@ def as_no_wish(made: Proposal) -> Proposal:
 def _with_strip(predicted: PredictedIntensity) -> str:
     """Return an intensity in words, also on the N strip where it is measured on one."""
     factor = "" if predicted.factor == 1.0 else f", within a factor of {plain(predicted.factor, 2)}"
-    of_n = f" ({plain(OVER_A['N'] * predicted.value, 2)} mm on N strips)"
-    return f"{plain(predicted.value, 2)} mmA{factor}{of_n if predicted.value < ON_N else ''}"
+    of_n = f" ({predicted.on_n_strips})" if predicted.is_for_n else ""
+    return f"{plain(predicted.value, 2)} mmA{factor}{of_n}"
 
 
 def with_prediction(

@@ -249,6 +249,14 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
                 "both, or agree on it",
             )
         )
+    if (lowest := float(posed.vertices[:, 2].min())) < 0.0:
+        found.append(
+            LeftOut(
+                {},
+                f"CLEAR OF THE MACHINE: outside of the walls the part reaches {-1e3 * lowest:.3g} "
+                "mm below the sonotrode's face, where the machine must leave it room",
+            )
+        )
     if text := open_holes(proposal):
         found.append(LeftOut({}, text))
     if text := moved_openings(proposal.chamber):

@@ -16,7 +16,7 @@ from chamberopt.design.ranges import unknowns
 from chamberopt.documents.document import Table
 from chamberopt.documents.ranges import range_texts
 from chamberopt.documents.report import report
-from chamberopt.documents.sheet import AsBuilt, cautions, process_sheet
+from chamberopt.documents.sheet import AsBuilt, cautions, first_checks, process_sheet
 from chamberopt.documents.terminal_lines import result_end
 from chamberopt.documents.wording import metric_label
 from chamberopt.peening.range_result import Spreads
@@ -116,6 +116,16 @@ def test_the_sheet_says_the_time_at_the_slow_end(folder: Path) -> None:
     expected = next(one for one in rows if getattr(one, "caption", "").startswith("Peening, and"))
     (text,) = [cell for name, cell in expected.rows if name.endswith(", at the slow end")]
     assert text == metric_label("time_to_98_s").format(slow)
+    # The yield speed halves or doubles the exposure, as half or twice the time would.
+    (covered,) = [cells[1] for cells in first_checks(result).rows if "mean cov" in cells[0]]
+    found = re.fullmatch(r".* as designed, ([\d.]+) to ([\d.]+) % before calibration", covered)
+    assert found is not None, covered
+    curve = result.record.coverage_against_time
+    first = min(curve, key=lambda one: abs(one.mean_coverage - 0.5))
+    times, shares = [one.time_s for one in curve], [one.mean_coverage for one in curve]
+    for told, share in zip(found.groups(), (0.5, 2.0), strict=True):
+        expected_share = np.interp(share * first.time_s, [0.0, *times], [0.0, *shares])
+        assert float(told) == pytest.approx(100.0 * expected_share, rel=0.1)
     planned = result.design.changed({"process.treatment_time_s": 1.5 * time.value})
     there = [text for text in cautions(replace(result, design=planned)) if "slow end" in text]
     assert there == [

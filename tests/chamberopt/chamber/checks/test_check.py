@@ -15,13 +15,16 @@ from manifold3d import CrossSection, Manifold
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import shot_reach, warnings
 from chamberopt.chamber.checks.facts import describe
-from chamberopt.chamber.checks.gaps import find_ledges, gutter_warnings
+from chamberopt.chamber.checks.gaps import find_ledges, gutter_warnings, surface_warnings
 from chamberopt.chamber.checks.place_names import CEILING, PART, PART_SIDE, SIDE_WALL, UPPER_SIDE
 from chamberopt.chamber.checks.warning import WarningKind
+from chamberopt.chamber.reach import find_reach
+from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
 from chamberopt.design.shapes import TAG_SONOTRODE
 from sim_core import SceneError
+from tests.chamberopt.chamber.checks.test_openings import chamber_of
 
 DESIGNS = Path(__file__).resolve().parents[4] / "designs"
 
@@ -281,3 +284,18 @@ def test_a_sonotrode_that_comes_near_the_part_is_warned_of(gear: tuple[Design, C
     (said,) = texts_of(WarningKind.CONTACT, quick, replace(chamber, vertices=vertices))
     assert "part and sonotrode are only 0.3 mm apart, less than ten amplitudes of 40 µm" in said
     assert "chamber.sonotrode_distance_mm" in said
+
+
+@pytest.mark.parametrize(("wide", "deep", "what"), [(1.0, 6.0, "gaps"), (20.0, 4.0, "corners")])
+def test_it_is_said_whether_gaps_or_corners_keep_balls_out(
+    wide: float, deep: float, what: str, tmp_path: Path
+) -> None:
+    """A groove of 1 mm takes no ball of 2.5 mm, and one of 20 mm all but in its two corners."""
+    groove = trimesh.creation.box((wide, 40.0, 2.0 * deep))
+    groove.apply_translation((0.0, 0.0, -6.0))
+    block = trimesh.creation.box((30.0, 30.0, 12.0))
+    body = trimesh.boolean.difference([block, groove], engine="manifold")
+    inside = {"box_mm": [[-10.1, -15.1, -6.1], [10.1, 15.1, 5.9]]}
+    chamber = chamber_of(tmp_path, body, target=inside)
+    (one,) = surface_warnings(find_reach(chamber_mesh(chamber), 2.5e-3), chamber)
+    assert f"most of it in {what}" in one.text
