@@ -308,7 +308,7 @@ BOUNDS = (
     Bound("numbers of dents", "3 a window for means, 25 for single places",
           (Page("explanation/accuracy.md", "How many dents it takes"),),
           "gives no interval: not resolved",
-          File("chamberopt/coverage/coverage_intervals.py", "not resolved")),
+          File("chamberopt/simulation/estimates.py", "not_known(NOT_RESOLVED)")),
     Bound("wear, temperature, air that streams, broken balls", "not simulated",
           (Page("reference/physics.md", "What is left out"),), "says nothing", None),
 )  # fmt: skip
