@@ -194,6 +194,11 @@ class PredictedIntensity:
         return replace(self, value=value, low=low, high=high)
 
     @property
+    def factor_in_words(self) -> str:
+        """The factor within which it is known, after its number; "" if strips were measured."""
+        return "" if self.factor == 1.0 else f", within a factor of {plain(self.factor, 2)}"
+
+    @property
     def is_for_n(self) -> bool:
         """Whether strips of the type N are taken for it."""
         return self.value < USED_FOR["N"][1]

@@ -432,6 +432,7 @@ def _chamber(result: Result, built: AsBuilt) -> Iterator[Row]:
 def _fixtures(result: Result, built: AsBuilt) -> Iterator[Row]:
     """Yield rows on what holds the part, where it goes out, and what masks it."""
     holder, openings = result.design.holder, built.openings
+    held = "clamp it there" if result.design.effects.part_turn is None else GUIDED
     if holder is not None and holder.kind == "bore":
         play = "tight"
         if holder.clearance_mm:
@@ -441,9 +442,8 @@ def _fixtures(result: Result, built: AsBuilt) -> Iterator[Row]:
     if holder is None and not result.record.chamber.pieces_in_air:
         padded = mask is not None and mask.axis is not None and not openings
         out = "the mask clamps it" if padded else "the part goes out through the wall"
-        held = GUIDED if result.design.effects.part_turn else "clamp it there"
         yield "holder", f"none: {out}{'' if padded else f'; {held}'}"
-    rows, held = [], "clamp it there" if result.design.effects.part_turn is None else GUIDED
+    rows = []
     for number, way in enumerate(openings):
         frame = "" if number else " in the chamber's frame"
         how = f"; {MOUNTED[built.mountings[number]]}" if built.mountings else ""
@@ -573,11 +573,10 @@ def _sonotrode(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
             for key, (_, low, high) in limits.items()
         ]
         yield "wall round the face", "; ".join(sides)
+    gap = slit_in_words(1e3 * min(design.ball_diameters))
     if over := _over_face(result):
-        gap = slit_in_words(1e3 * min(design.ball_diameters))
         yield "walls over the face", f"at both ends of the {over}, clear of it by {gap}"
     if face is not None and face.count > 1:
-        gap = slit_in_words(1e3 * min(design.ball_diameters))
         yield "gaps between the blocks", f"{gap}, half a ball"
     yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"
     yield "amplitude", amplitude_text(design.sonotrode)
@@ -681,7 +680,7 @@ def _expected(result: Result, usual: WantedIntensity | None) -> Iterator[Row]:
     wanted = result.design.process.intensity_mmA
     rough = PredictedIntensity.of(result.metrics, calibration)
     if wanted is None and rough is not None and "almen_intensity" not in result.metrics:
-        near = f"about {plain(rough.value, 2)} mmA, within a factor of {plain(rough.factor, 2)}"
+        near = f"about {plain(rough.value, 2)} mmA{rough.factor_in_words}"
         yield "Almen intensity, roughly", near
     if wanted is None and usual is not None:
         yield "Almen intensity, usual", f"{_range_text(usual)}, {usual.text}"
@@ -778,10 +777,8 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
     if row and share.has_number:
         over = ""
         if row.time_s < end:
-            share, over = (
-                Estimate(row.mean_coverage, row.half_width),
-                _over_ranges(result, row.time_s),
-            )
+            share = Estimate(row.mean_coverage, row.half_width)
+            over = _over_ranges(result, row.time_s)
             after = f"{plain(row.time_s, 3)} s"
         text = estimate_text(share, 100.0, "%")
         yield f"mean coverage of the target after {after}", f"{text}{over}"
@@ -790,9 +787,9 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
         rough = PredictedIntensity.of(result.metrics, calibration)
         kind, known = "A", "not known before: calibrates to mmA"
         if rough is not None:
-            kind, spread = "N" if rough.is_for_n else "A", plain(rough.factor, 2)
+            kind = "N" if rough.is_for_n else "A"
             known = rough.on_n_strips if rough.is_for_n else f"{plain(rough.value, 2)} mmA"
-            known += f", within a factor of {spread}, as impacts on the target would give"
+            known += f"{rough.factor_in_words}, as impacts on the target would give"
         strips = f"{kind} strips {_strip_times(result)}, for chamberopt calibrate"
         if level_mm is not None and not why_no_strip(design, StripSize()):
             strips += (

@@ -9,6 +9,7 @@ import numpy as np
 
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE
 from chamberopt.geometry.triangles import border_edges, connected_pieces
+from sim_core import computed_once
 
 if TYPE_CHECKING:
     from matplotlib.path import Path
@@ -45,6 +46,7 @@ class SectionPlane:
     span: float
 
 
+@computed_once(4)
 def section_planes(chamber: Chamber) -> list[SectionPlane]:
     """Return one plane that shows the part best, or two across each other if one does not do.
 

@@ -298,9 +298,9 @@ def draw_sheet(
     """Return a process sheet as figures of its pages.
 
     The first page has a heading, sentences in red, a drawing of the chamber and the content. Where
-    its scale is small, a page of its own has a larger one. Each
-    further step in which the part stands otherwise has a page with its drawing. The last page has
-    the outlines of openings. Each page has the title block at its foot.
+    its scale is small, a page of its own has a larger one. Each further step in which the part
+    stands otherwise has a page with its drawing. The last page has the outlines of openings. Each
+    page has the title block at its foot.
 
     Args:
         sheet: a document as process_sheet makes it.
@@ -331,11 +331,10 @@ def draw_sheet(
         measured = [one for one in content if one not in settings]
         pages += _further_pages(further, measured, sheet.name)
     if drawing_scale(chamber, (INNER, tall)) < LEAST_SCALE:
-        last, y = _further_page("Drawing", sheet.name)
-        _drawing(
-            last, chamber, y, drawing_height(chamber, (INNER, y - FOOT - CAPTION)), limits, face
-        )
-        pages.append(last)
+        larger, y = _further_page("Drawing", sheet.name)
+        tall = drawing_height(chamber, (INNER, y - FOOT - CAPTION))
+        _drawing(larger, chamber, y, tall, limits, face)
+        pages.append(larger)
     pages += _further_steps(chamber, sheet.name, limits, face)
     if openings:
         last, y = _further_page("Openings", sheet.name)

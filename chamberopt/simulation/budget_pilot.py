@@ -180,9 +180,10 @@ def measure_budget(
     if not dents or not mean > 0.0:
         raise InputError(f"the shot hardly hits the target in {simulated:.3g} simulated s")
     resolved = _resolved(found)
-    intensity = PredictedIntensity.of(wide.metrics, design.calibration)
     if wide.metrics["strength_um"].in_words:
         intensity = rough_intensity(slow, chamber, executor, replicas)
+    else:
+        intensity = PredictedIntensity.of(wide.metrics, design.calibration)
     mean_time = slow.process.treatment_time / mean
     return Measured(
         dent_rate=dents / (simulated * slow.process.accuracy.gauge),

@@ -148,7 +148,7 @@ def surface_warnings(
         return []
     sharp = own & ~reach.fits
     place = one_of(touches.point[missed], touches.area[missed])
-    remedy = f"narrow {selection_of(name)}"
+    remedy, where = f"narrow {selection_of(name)}", ""
     if name == TARGET:
         remedy += ", or set part.target.reachable = true"
     if touches.area[sharp].sum() > 0.5 * left:
@@ -156,8 +156,6 @@ def surface_warnings(
         second_half = np.cumsum(touches.area[own][order]) > 0.5 * left
         diameter_mm = 2e3 * float(touches.radius[own][order][np.argmax(second_half)])
         remedy = f"balls of {diameter_mm:.2g} mm would fit half of that; or {remedy}"
-    where = ""
-    if touches.area[sharp].sum() > 0.5 * left:
         faces = touches.area[sharp & (touches.cosine < FACING)].sum()
         what = "gaps" if faces > 0.5 * touches.area[sharp].sum() else "corners or fillets"
         where = f", most of it in {what} narrower than a ball"

@@ -399,9 +399,8 @@ def as_no_wish(made: Proposal) -> Proposal:
 
 def _with_strip(predicted: PredictedIntensity) -> str:
     """Return an intensity in words, also on the N strip where it is measured on one."""
-    factor = "" if predicted.factor == 1.0 else f", within a factor of {plain(predicted.factor, 2)}"
     of_n = f" ({predicted.on_n_strips})" if predicted.is_for_n else ""
-    return f"{plain(predicted.value, 2)} mmA{factor}{of_n}"
+    return f"{plain(predicted.value, 2)} mmA{predicted.factor_in_words}{of_n}"
 
 
 def with_prediction(
