@@ -30,6 +30,9 @@ MAX_POINTS = 50  # points of a profile
 MAX_SHARE = 2.0
 MAX_BLOCKS = 20  # in a row
 ROUND = 64  # corners about a disc
+# Height of what is drawn of a disc or block over its side, and its depth below the floor over that
+# height, so that the floor is drawn in front of it.
+DRAWN, SUNK = 0.15, 0.01
 LEAST_LARGEST = 0.1  # of the shares: with less, amplitude_um is not that of the face
 POINTS = (
     "pairs [mm from the middle, share], from 0 to the rim, e.g. [[0, 1], [20, 0.97], [35, 0.9]]"
@@ -250,6 +253,18 @@ class Face(FileTable):
             return np.asarray(half * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]]))
         angle = 2.0 * np.pi * np.arange(ROUND) / ROUND
         return np.asarray(half / np.cos(np.pi / ROUND) * np.c_[np.cos(angle), np.sin(angle)])
+
+    @property
+    def body(self) -> tuple[np.ndarray, np.ndarray]:
+        """Body to draw below the face, closed: its points [m] and triangles.
+
+        How far a sonotrode reaches down, half a wave or more, is not known: a piece is drawn.
+        """
+        from chamberopt.geometry.solids import extrude
+
+        height = DRAWN * 1e-3 * max(self.block_mm)
+        points, triangles = extrude(self.outline, height)
+        return points - [0.0, 0.0, (1.0 + SUNK) * height], triangles
 
     @property
     def joints_mm(self) -> tuple[list[float], list[float]]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.checks.openings import PLATE
+from chamberopt.chamber.checks.openings import PLATE, thin_ribs
 from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.fixture import plugs_in_words, size_in_words
 from chamberopt.chamber.layout.pose import axis_down
@@ -450,6 +450,10 @@ def _fixtures(result: Result, built: AsBuilt) -> Iterator[Row]:
         beyond = _beyond(way, openings, held, how)
         rows.append(("opening", f"{_of_opening(way)} at {_place(way)} mm{frame}; {beyond}"))
     yield from _first(rows, "openings")
+    for rib in thin_ribs(openings):
+        one, other = (f"the opening in {_wall_of(way)}" for way in (rib.one, rib.other))
+        width = plain(1e3 * rib.width, 2)
+        yield "no rib", f"{width} mm between {one} and {other} do not stand: cut both as one"
     faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
     for name, one in result.record.chamber.fixtures.items():
         size = size_in_words(one.kind, one.size_mm)

@@ -119,7 +119,7 @@ def shape_answer(design: Design, step: int = 0) -> bytes:
         "form": _form(design),
     }
     surface = _surface(shape.vertices, shape.triangles, shape.tags)
-    return packed(head, **surface, state=state, zone=zone)
+    return packed(head, **surface, **_block(design), state=state, zone=zone)
 
 
 def _form(design: Design) -> str:
@@ -165,7 +165,8 @@ def check_answers(design: Design, step: int = 0) -> Iterator[bytes]:
     remeshed = part.file is not None and part.file.original is not None
     own = {"part_points": 1e3 * part.vertices, "part_triangles": part.triangles} if remeshed else {}
     surface = _surface(chamber.vertices, chamber.triangles, chamber.tags)
-    yield packed(head, **{**surface, **_bodies(one, chamber)}, state=state, **own)
+    bodies = _bodies(one, chamber) | _block(one)
+    yield packed(head, **{**surface, **bodies}, state=state, **own)
 
     reach = shot_reach(one, chamber)
     found = describe(design, whole)
@@ -247,6 +248,14 @@ def _bodies(design: Design, chamber: Chamber) -> dict[str, np.ndarray]:
         walls &= ~chamber.on_fixture(name)
         found |= {f"{name}_points": 1e3 * fixture.vertices, f"{name}_triangles": fixture.triangles}
     return {"walls": chamber.triangles[walls], **found}
+
+
+def _block(design: Design) -> dict[str, np.ndarray]:
+    """Return what is drawn of the disc or blocks on which the chamber stands [mm], if known."""
+    if design.sonotrode.face is None:
+        return {}
+    points, triangles = design.sonotrode.face.body
+    return {"block_points": 1e3 * points, "block_triangles": triangles}
 
 
 def packed(head: Mapping[str, object], **arrays: np.ndarray) -> bytes:

@@ -16,6 +16,9 @@ from chamberopt.search.study import load_study
 
 ROUND_S, LONG_S = 5, 90  # shorter times are told in steps of seconds, longer ones in minutes
 MINUTE, HOUR = 60, 3600
+# Times as long as one design's replicas that a study may take, as each candidate takes replicas
+# until it can be told from the best: 2 min were foretold of a study that took 228 s.
+SPREAD = 3
 
 
 def duration_in_words(path: Path, results: Iterable[Path]) -> str:
@@ -35,7 +38,9 @@ def duration_in_words(path: Path, results: Iterable[Path]) -> str:
         with suppress(InputError):
             result = load_result(folder)
             if _is_like(design, result.design):
-                return _in_words(_whole_seconds(design, evaluations, result))
+                seconds = _whole_seconds(design, evaluations, result)
+                is_rough = evaluations > 1 and result.record.study is None
+                return _in_words(seconds, SPREAD * seconds if is_rough else seconds)
     return ""
 
 
@@ -77,9 +82,15 @@ def _balls_s(design: Design) -> float:
     return design.shot.count * (process.recorded_time + process.accuracy.warmup_time)
 
 
-def _in_words(seconds: float) -> str:
-    if seconds < LONG_S:
-        return f"about {max(1, round(seconds / ROUND_S)) * ROUND_S} s"
-    if seconds < 1.5 * HOUR:
-        return f"about {round(seconds / MINUTE)} minutes"
-    return f"about {seconds / HOUR:.2g} hours"
+def _in_words(least: float, most: float) -> str:
+    """Return a time between two, which may be the same, in the unit that suits the longer one."""
+    if most < LONG_S:
+        texts = [f"{max(1, round(one / ROUND_S)) * ROUND_S}" for one in (least, most)]
+        unit = "s"
+    elif most < 1.5 * HOUR:
+        texts = [f"{max(1, round(one / MINUTE))}" for one in (least, most)]
+        unit = "minutes"
+    else:
+        texts = [f"{one / HOUR:.2g}" for one in (least, most)]
+        unit = "hours"
+    return f"about {' to '.join(dict.fromkeys(texts))} {unit}"

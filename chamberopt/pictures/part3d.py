@@ -16,6 +16,7 @@ import numpy as np
 
 from chamberopt.chamber.bores_and_deflectors import on_deflectors
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
+from chamberopt.design.sonotrode import Face
 from chamberopt.geometry.sight import way_to_see
 from chamberopt.geometry.triangles import border_edges
 from chamberopt.pictures.charts.colours import EDGES
@@ -131,7 +132,8 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         "zones": zones,
         "surface": _packed(triangles[:0] if surface is None else surface[triangles], "<i4"),
         "names": () if surface is None else arrays.chamber.part.names,
-        "surfaces": _surfaces(part, rest, chamber, on_deflector)
+        "surfaces": _block(result.design.sonotrode.face)
+        | _surfaces(part, rest, chamber, on_deflector)
         | {
             name: _shape(MM * one.vertices, one.triangles) | {"kind": name}
             for name, one in arrays.chamber.fixtures.items()
@@ -190,6 +192,14 @@ def _surfaces(
         if surface is not None and surface.n_cells:
             found[name] = _shape(surface.points, surface.regular_faces) | {"kind": kind}
     return found
+
+
+def _block(face: Face | None) -> dict[str, dict[str, object]]:
+    """Return what is drawn of the disc or blocks on which the chamber stands, if known."""
+    if face is None:
+        return {}
+    points, triangles = face.body
+    return {"block": _shape(MM * points, triangles) | {"kind": "sonotrode", "opacity": 1}}
 
 
 def _shape(points: np.ndarray, triangles: np.ndarray) -> dict[str, object]:

@@ -21,7 +21,7 @@ from chamberopt.chamber.checks.strips import strip_of_target
 from chamberopt.chamber.checks.usual import usual_for_target
 from chamberopt.chamber.fixture import plugs_of
 from chamberopt.common.errors import InputError
-from chamberopt.common.files import claim_file, write_bytes
+from chamberopt.common.files import claim_file, private_folder, write_bytes
 from chamberopt.common.number_text import held_together
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.sheet import (
@@ -35,6 +35,7 @@ from chamberopt.documents.sheet import (
 from chamberopt.peening.strip_holder import target_level_mm
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
 from chamberopt.pictures.charts.figure_style import ignore_settings_here
+from chamberopt.pictures.coverage import draw_coverage
 from chamberopt.pictures.part_drawing import (
     LEGEND,
     RASTER,
@@ -72,6 +73,10 @@ CAPTION, ROW = 7.0, 8.0  # mm, of the caption, and of a row of the title block
 FIELDS = 6  # in a row of the title block
 FOOT = MARGIN + 2.0 * ROW + 3.0  # mm, where the content ends
 RED = "#C00000"
+COVERAGE = (
+    "Share of the surface that is dented after the treatment time, simulated, in windows round "
+    "each place. Look first where it is least."
+)
 COLUMNS = (88.0, 62.0, 36.0)  # mm, of a table with a head
 MM_PER_PT = 25.4 / 72.0
 LEADING = 1.25  # height of a line over the size of its letters
@@ -283,9 +288,25 @@ def write_sheet(
         )
         sheet = process_sheet(loaded, built, revision)
         limits, face = slit_limits(loaded) | chamber_limits(loaded), design.sonotrode.face
-        pages = draw_sheet(sheet, chamber, limits, face, drawn_openings(built))
+        pages = draw_sheet(
+            sheet, chamber, limits, face, drawn_openings(built), coverage_map(loaded.folder)
+        )
         _save(path, pages, sheet.name)
     return path, sheet
+
+
+def coverage_map(folder: Path) -> np.ndarray | None:
+    """Return the picture of a result's coverage, drawn anew, or None if it cannot be drawn here.
+
+    The picture in the folder may not be that of the result, as it has no digest.
+    """
+    from matplotlib.image import imread
+
+    with private_folder() as own:
+        picture = Path(own) / "coverage.png"
+        if draw_coverage([folder], [""], picture) is not None:
+            return None
+        return np.asarray(imread(picture))
 
 
 def draw_sheet(
@@ -294,19 +315,21 @@ def draw_sheet(
     limits: Limits = MappingProxyType({}),
     face: Face | None = None,
     openings: Sequence[tuple[str, Opening]] = (),
+    coverage: np.ndarray | None = None,
 ) -> list[Figure]:
     """Return a process sheet as figures of its pages.
 
     The first page has a heading, sentences in red, a drawing of the chamber and the content. Where
     its scale is small, a page of its own has a larger one. Each further step in which the part
-    stands otherwise has a page with its drawing. The last page has the outlines of openings. Each
-    page has the title block at its foot.
+    stands otherwise has a page with its drawing. The last pages have the coverage by place, and the
+    outlines of openings. Each page has the title block at its foot.
 
     Args:
         sheet: a document as process_sheet makes it.
         limits: what the keys of [chamber] may be, for the drawing's dimensions.
         face: on which the chamber stands, if it is known.
         openings: those that are cut along the part's section, each with its words.
+        coverage: picture of the coverage, red, green and blue of each pixel.
     """
     ignore_settings_here()
     first, further, block = sheet.sections
@@ -336,6 +359,8 @@ def draw_sheet(
         _drawing(larger, chamber, y, tall, limits, face)
         pages.append(larger)
     pages += _further_steps(chamber, sheet.name, limits, face)
+    if coverage is not None:
+        pages.append(_coverage_page(coverage, sheet.name))
     if openings:
         last, y = _further_page("Openings", sheet.name)
         scale = draw_openings(last, openings, MARGIN, y - CAPTION, (INNER, y - FOOT - CAPTION))
@@ -461,6 +486,19 @@ def _further_steps(
             _drawing(axes, room, y, tall, limits, face)
             drawn.append(posed)
             yield axes
+
+
+def _coverage_page(picture: np.ndarray, name: str) -> Axes:
+    """Return a page with the picture of the coverage, as wide as the page if it is low enough."""
+    axes, y = _further_page("Coverage by place", name)
+    y = Writer(axes, 7.0).write(COVERAGE, MARGIN, y, INNER) - 3.0
+    rows, columns = picture.shape[:2]
+    size = np.array([columns, rows]) * min(INNER / columns, (y - FOOT) / rows)
+    axes.imshow(
+        picture, extent=(MARGIN, MARGIN + size[0], y - size[1], y), interpolation="antialiased"
+    )
+    axes.set(xlim=(0.0, WIDTH), ylim=(0.0, HEIGHT), aspect="auto")
+    return axes
 
 
 def _further_page(title: str, name: str) -> tuple[Axes, float]:

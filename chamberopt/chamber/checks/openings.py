@@ -5,7 +5,8 @@ Where a wall crosses a hole of the part, a piece of the wall stands in the hole.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import combinations
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -39,6 +40,10 @@ AS_CUT = 1e-4
 FACETED = 0.98  # least distance of a side's middle from that of a circle over the radius
 AT_EDGE = 1e-5  # m: a line this near to the edge of a wall lies on it
 PLATE = 0.01  # m outside a wall's inner face, in which the wall is, however thick
+
+# m: of a wall between two openings, below which it does not stand, by rule of thumb; and between
+# points along their sides, by which it is measured.
+LEAST_RIB, RIM_STEP = 2e-3, 2.5e-4
 
 Form = Literal["rectangle", "round", "other", "edge"]
 """How an opening is cut: as a rectangle, drilled, along the part's section, or the wall ends."""
@@ -75,6 +80,40 @@ def mounting(part: Part, opening: Opening, clear: float) -> Mounting:
     level = float(np.dot(opening.place, opening.way))
     inside, outside = passes_opening(part.vertices @ frame.T, part.triangles, level, clear)
     return "part goes in" if inside else "wall goes over" if outside else "split"
+
+
+class Rib(NamedTuple):
+    """What is left of the walls between two openings that nearly meet."""
+
+    one: Opening
+    other: Opening
+    width: float  # [m]
+
+
+def thin_ribs(openings: Sequence[Opening]) -> list[Rib]:
+    """Return the ribs between openings that are too thin to stand, of each two their thinnest.
+
+    Openings that meet at an edge of their walls leave none.
+    """
+    from scipy.spatial import cKDTree
+
+    rims = [_points_of_rim(one) for one in openings]
+    pairs = combinations([k for k, rim in enumerate(rims) if len(rim)], 2)
+    found = ((i, j, float(cKDTree(rims[i]).query(rims[j])[0].min())) for i, j in pairs)
+    return [
+        Rib(openings[i], openings[j], width) for i, j, width in found if AS_CUT < width < LEAST_RIB
+    ]
+
+
+def _points_of_rim(opening: Opening) -> np.ndarray:
+    """Return points along the sides of an opening in the chamber's frame [m], (n, 3)."""
+    if opening.outline is None or not len(opening.outline):
+        return np.empty((0, 3))
+    start, end = opening.outline[:, 0], opening.outline[:, 1]
+    steps = int(np.ceil(np.linalg.norm(end - start, axis=1).max() / RIM_STEP))
+    shares = np.linspace(0.0, 1.0, steps + 1)[:, None, None]
+    flat = (start + shares * (end - start)).reshape(-1, 2)
+    return np.asarray(opening.place + flat @ _frame(opening.wall, np.array(opening.way)))
 
 
 class Joint(NamedTuple):

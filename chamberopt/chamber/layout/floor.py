@@ -49,8 +49,8 @@ WHOLE, WHOLE_OF_BLOCKS = 1.25, 1.1
 def of_blocks(ball: float) -> str:
     """Return what is said of a floor of several sonotrodes, for a diameter of the balls [m]."""
     return (
-        "LARGER THAN ONE SONOTRODE: several side by side, which vibrate in phase and alike: settle "
-        "with their maker how they are driven and tuned for that; gaps "
+        "LARGER THAN ONE SONOTRODE: the floor is several side by side, which must vibrate in phase "
+        "and alike: settle with their maker how they are driven and tuned for that; gaps "
         f"between them of {slit_in_words(1e3 * ball)}, half a ball"
     )
 

@@ -292,12 +292,12 @@ def larger_instead(
         ):
             continue
         ratio = found.time_to_98 / now.found.time_to_98
-        kept = f"they touch {other.touched:.0%} of the target"
+        kept = f"these touch {other.touched:.0%} of the target"
         if weak and ratio <= 1.0:
             reason = (
-                f"{LARGER}: {kept} and cover it no later by "
-                f"pilots than {here.in_words}, which are too weak; {1.0 - other.served:.0%} of the "
-                "target lies in fillets of less than 2 or slots of less than 4 of their diameters, "
+                f"{LARGER}: by pilots {here.in_words} are too weak, and {kept} and cover it no "
+                f"later; {1.0 - other.served:.0%} of the target lies in fillets of less than 2 or "
+                "slots of less than 4 of their diameters, "
                 f"for which practice takes smaller ones (--ball-mm {here.ball_mm:g} takes these)"
             )
         elif (

@@ -41,7 +41,7 @@ async function open(design) {
 
 const view = new View3D(find("view")), tools = new Tools([view], find("tools"));
 let drawnPart = "", pointed = "", seen = null;
-const CHAMBER = ["walls", "sonotrode", "edges"];
+const CHAMBER = ["walls", "sonotrode", "block", "edges"];
 
 // Draw the part beside its size, where the names of its surfaces are pointed at.
 async function draw(part) {
@@ -81,6 +81,8 @@ async function drawChamber(isDraft) {
   view.highlight("part", null); // the target has its own colour
   view.pose("part", answer.rotation, answer.shift);
   colourByState(view, "part", seen, answer.state);
+  if (answer.block_points) view.surface("block", { points: answer.block_points, triangles: answer.block_triangles, kind: "sonotrode", opacity: 1 });
+  else view.remove("block"); // of the proposal before
   view.surface("walls", { points: answer.points, triangles: answer.walls, kind: "wall" });
   view.surface("sonotrode", { points: answer.points.slice(), triangles: answer.sonotrode, kind: "sonotrode" });
   view.lines("edges", answer.edges, seen.edges, "wall");

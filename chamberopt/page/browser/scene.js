@@ -2,7 +2,7 @@
 import { change, endMove, state, unpack, value } from "./state.js";
 import { colourByState } from "./surfaces.js";
 
-const BODIES = ["deflectors", "holder", "mask"]; // that not every chamber has
+const BODIES = ["block", "deflectors", "holder", "mask"]; // that not every chamber has
 export const view = new View3D(document.getElementById("view"));
 const tools = new Tools([view], document.getElementById("tools"));
 let bodies = null, through = false;
@@ -55,6 +55,7 @@ function walls(answer) {
   const surface = (name, kind, triangles, points = answer.points, opacity = undefined) => {
     if (triangles?.length) view.surface(name, { points: points.slice(), triangles: triangles.slice(), kind, opacity });
   };
+  surface("block", "sonotrode", answer.block_triangles, answer.block_points, 1);
   surface("walls", "wall", answer.walls);
   surface("deflectors", "wall", answer.deflectors);
   surface("sonotrode", "sonotrode", answer.sonotrode);

@@ -31,6 +31,7 @@ def test_a_study_takes_as_long_as_its_evaluations(result: Result, tmp_path: Path
     (tmp_path / "study.toml").write_text(f"{study}[optimizer]\nevaluations = 100000\n")
     words = duration_in_words(tmp_path / "study.toml", [result.folder])
     assert words.endswith(("minutes", "hours"))
+    assert " to " in words  # by a design's result it is not known how many replicas they take
     known = SimpleNamespace(study=SimpleNamespace(seconds=366.0, evaluations=6))
     like: Any = SimpleNamespace(record=known)
     assert _whole_seconds(result.design, 9, like) == 549.0

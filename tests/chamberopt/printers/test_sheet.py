@@ -52,6 +52,7 @@ from chamberopt.pictures.part_drawing import (
     drawing_scale,
 )
 from chamberopt.pictures.section import cut, face_size_mm, inside, section_planes
+from chamberopt.pictures.subprocess_drawing import missing_opengl
 from chamberopt.printers.sheet_page import (
     HEIGHT,
     MARGIN,
@@ -131,6 +132,18 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
         "by 1.2 mm",
     ]
     first = openings[0]
+    sides = np.array([[[-0.03, 0.0], [0.03, 0.0]]])
+    below = first._replace(place=(0.0, 0.04, 0.1), outline=sides)
+    above = openings[2]._replace(place=(0.0, 0.0393, 0.1), outline=sides)
+    rows = next(
+        one
+        for one in setting_tables(bore, AsBuilt((50.0,), (below, above)))
+        if one.rows and one.caption == "Chamber"
+    ).rows
+    assert dict(rows)["no rib"] == (
+        "0.7 mm between the opening in the wall at +y and the opening in the ceiling do not "
+        "stand: cut both as one"
+    )
     forms = [
         first._replace(form="round", size=(0.0604, 0.06041), way=(0.0, 0.89, -0.456)),
         first._replace(form="other", wider=(0.0612, 0.08)),
@@ -651,17 +664,20 @@ def test_the_section_shows_the_part() -> None:
         assert told == f"{drawn}{text}"
 
 
-def test_it_is_one_a4_page_and_replaces_only_an_older_one(
+def test_it_is_an_a4_page_with_a_map_and_replaces_only_an_older_one(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
-    path = tmp_path / "sheet.pdf"
+    path, has_map = tmp_path / "sheet.pdf", missing_opengl() is None
     for _ in range(2):
         assert main(["report", str(folder), "--sheet", "--out", str(path)]) == 0
         assert f"process sheet in {path}" in capsys.readouterr().out
     content = path.read_bytes()
-    (box,) = re.findall(rb"/MediaBox \[ ([\d. ]+) \]", content)
-    assert tuple(map(float, box.split())) == pytest.approx((0.0, 0.0, *A4), abs=0.02)
-    assert len(re.findall(rb"/Type /Page\b", content)) == 1
+    boxes = re.findall(rb"/MediaBox \[ ([\d. ]+) \]", content)
+    for box in boxes:
+        assert tuple(map(float, box.split())) == pytest.approx((0.0, 0.0, *A4), abs=0.02)
+    # Where the computer can draw in 3D, a second page has the coverage by place.
+    assert len(re.findall(rb"/Type /Page\b", content)) == len(boxes) == 1 + has_map
+    assert len(re.findall(rb"/Subtype /Image\b", content)) == has_map
     assert b"/FontFile2" in content  # letters that can be selected, not their outlines
     precious = tmp_path / "precious.pdf"
     precious.write_bytes(b"%PDF-1.4 of somebody")

@@ -5,7 +5,7 @@ class Section {
   // side in a design, so a shell behind them is filled; a deflector's surface lacks what lies on a wall.
   static SURFACES = { part: ["part", "rest"], remeshed: ["part", "rest"], few: ["part", "rest"], unreached: ["part", "rest"],
     rest: ["part", "rest"], holder: ["holder", "holder"], mask: ["mask", "mask"], deflectors: ["deflectors", "wall", "lid"],
-    sonotrode: ["sonotrode", "sonotrode", "shell"], walls: ["walls", "wall", "shell"] };
+    sonotrode: ["sonotrode", "sonotrode", "shell"], block: ["sonotrode", "sonotrode"], walls: ["walls", "wall", "shell"] };
   static BODIES = ["walls", "deflectors", "sonotrode", "mask", "holder", "part"]; // the last is in front
   static THICKNESS = 0.025; // of a shell, over the size of the view
   #fills = new Map();
@@ -54,7 +54,7 @@ class Section {
     this.#stale = true;
     this.#clip(mesh.material, [this.plane]);
     const [body, , how] = Section.SURFACES[name] ?? [];
-    if (!body || mesh.userData.open) return;
+    if (!body || mesh.userData.open || name === "sonotrode" && this.view.get("block")) return; // the block is the body below it
     const shape = how === "shell" ? Section.shell(mesh.geometry, Section.THICKNESS * this.view.home.size)
       : how === "lid" ? Section.lid(mesh.geometry) : mesh.geometry;
     for (const [side, count] of [[THREE.BackSide, THREE.IncrementWrapStencilOp], [THREE.FrontSide, THREE.DecrementWrapStencilOp]]) {

@@ -6,9 +6,10 @@ class Tools {
   // Names of views, and the way from what is looked at to the eye. A little aside, as z is up.
   static WAYS = { Front: [[0, -1, 0], "along y"], Back: [[0, 1, 0], "against y"], Left: [[-1, 0, 0], "along x"],
     Right: [[1, 0, 0], "against x"], Top: [[0, -1e-4, 1], "from above"], Bottom: [[0, -1e-4, -1], "from below"],
-    Isometric: [[1, -1, 1], "from a corner"], Fit: [undefined, "all that is shown, from where the eye is"] };
+    Isometric: ["corner", "from the corner that sees most of what is looked at"], Fit: [undefined, "all that is shown, from where the eye is"] };
   #cut = { normal: [0, -1, 0], low: -1, high: 1 };
   #isFlipped = false;
+  #isChosen = false; // whether a user chose across which axis
 
   // Views that a section and measuring serve together; the controls are put into `place`.
   constructor(views, place) {
@@ -45,7 +46,7 @@ class Tools {
     for (const button of [this.section, this.measure, this.parallel]) button.setAttribute("aria-pressed", "false");
     this.section.addEventListener("click", () => this.#turn(this.section.ariaPressed !== "true"));
     this.measure.addEventListener("click", () => this.#measure(this.measure.ariaPressed !== "true"));
-    this.by.addEventListener("change", () => this.#begin());
+    this.by.addEventListener("change", () => { this.#isChosen = true; this.#begin(); });
     this.slider.addEventListener("input", () => { this.at.value = Tools.rounded(this.slider.value); this.#apply(); });
     this.at.addEventListener("input", () => { this.slider.value = this.at.value; this.#apply(); });
     this.flip.addEventListener("click", () => { this.#isFlipped = !this.#isFlipped; this.#apply(); });
@@ -69,8 +70,16 @@ class Tools {
   #turn(on) {
     this.section.ariaPressed = String(on);
     this.controls.hidden = !on;
-    if (on) this.#begin();
-    else for (const view of this.views) view.section.off();
+    if (on) {
+      this.by.value = this.#isChosen ? this.by.value : Tools.#across(this.views[0]);
+      this.#begin();
+    } else for (const view of this.views) view.section.off();
+  }
+
+  // The level axis that is most along sight: a plane across the other would be seen edge on.
+  static #across({ camera, orbit }) {
+    const sight = camera.position.clone().sub(orbit.target);
+    return Math.abs(sight.x) > Math.abs(sight.y) ? "x" : "y";
   }
 
   // Cut in the middle, so that the eye sees the section, or wait for the click on a face.

@@ -4,6 +4,7 @@ THREE.ColorManagement.enabled = false; // a colour on the screen is the one of t
 const TEXT_HEIGHT = 0.0115; // over its distance: 2.2 % of the view's height
 const TEXT_PX = 15; // least height on the screen, so that a text is read in a small view too
 const OPACITY = { wall: 0.16, sonotrode: 0.9 }; // of the kinds that are seen through
+const MARKED = 0.5; // opacity of what marks triangles, so that their own colour is seen
 const FROM_BELOW = 0.08; // opacity of the sonotrode before the part
 const WIDE = 0.7; // width over height of a view that shows all, also what is as wide as its diagonal
 const LENS = 30, PARALLEL = 0.1; // degrees of the view from bottom to top; of an eye so far away that lines of sight are parallel
@@ -214,7 +215,7 @@ class View3D {
     this.element.dataset.highlight = triangles.length;
     const { points, index } = mesh.userData, own = new Uint32Array(3 * triangles.length);
     triangles.forEach((k, i) => own.set(index.subarray(3 * k, 3 * k + 3), 3 * i));
-    const marked = this.surface("highlight", { points, triangles: own, opacity: 0.8 });
+    const marked = this.surface("highlight", { points, triangles: own, opacity: MARKED });
     marked.material.color.set(colour);
     Object.assign(marked.material, { depthTest: false });
     marked.renderOrder = 1;
@@ -344,11 +345,19 @@ class View3D {
     camera.updateProjectionMatrix();
   }
 
-  // Look at all surfaces that are to be seen, from the side to which a way [x, y, z] leads, by default from where the eye is.
-  from(way = this.camera.position.clone().sub(this.orbit.target).toArray()) {
+  // The corner [x, y, z], of ones, that is nearest to the eye of the home view, which sees most of the target.
+  #corner() {
+    const { middle, eye } = this.home ?? { middle: [0, 0, 0], eye: [1, -1, 1] };
+    return eye.map((x, i) => x < middle[i] ? -1 : 1);
+  }
+
+  // Look at all surfaces that are to be seen, from the side to which a way [x, y, z] leads, or from a "corner", by default from
+  // where the eye is.
+  from(side = this.camera.position.clone().sub(this.orbit.target).toArray()) {
+    const way = side === "corner" ? this.#corner() : side;
     const { low, high } = this.extent(), size = Math.hypot(...high.map((x, i) => x - low[i]));
     if (!Number.isFinite(size)) return; // nothing is to be seen
-    const middle = low.map((x, i) => (x + high[i]) / 2), far = 2.2 * size / Math.hypot(...way);
+    const middle = low.map((x, i) => (x + high[i]) / 2), far = 2.4 * size / Math.hypot(...way);
     this.#aim({ middle, size, eye: middle.map((x, i) => x + far * way[i]) });
   }
 
@@ -398,14 +407,15 @@ class View3D {
     renderer.render(this.triad, this.triadCamera);
   }
 
-  // Show what the eye can make out: the part through the sonotrode, dimensions from aside, and of texts that overlap the first.
+  // Show what the eye can make out: the part through the sonotrode and without what is below it, dimensions from aside, and of texts that overlap the first.
   #show() {
     const sight = this.camera.getWorldDirection(new THREE.Vector3()), taken = [], all = this.all().map(([, mesh]) => mesh);
-    const sonotrode = this.get("sonotrode");
-    if (sonotrode) sonotrode.material.opacity = this.camera.position.z < 0 ? FROM_BELOW : OPACITY.sonotrode;
+    const sonotrode = this.get("sonotrode"), isBelow = this.camera.position.z < 0;
+    if (sonotrode) sonotrode.material.opacity = isBelow ? FROM_BELOW : OPACITY.sonotrode;
     for (const mesh of all) {
       const { along } = mesh.userData, isEndOn = along && Math.abs(sight.dot(new THREE.Vector3(...along))) > END_ON;
-      mesh.traverse((one) => { one.layers.set(isEndOn ? 1 : 0); }); // the camera sees the layer 0
+      const isUnseen = isEndOn || isBelow && mesh === this.get("block");
+      mesh.traverse((one) => { one.layers.set(isUnseen ? 1 : 0); }); // the camera sees the layer 0
     }
     const usual = TEXT_HEIGHT * this.element.clientHeight / (2 * halfOf(LENS));
     const height = Math.max(usual, TEXT_PX), scale = 2 * halfOf(this.camera.fov) * height / this.element.clientHeight;

@@ -1,5 +1,6 @@
 """Openings through which the part goes out: bodies whose openings are known."""
 
+import math
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,6 +16,7 @@ from chamberopt.chamber.checks.openings import (
     find_walls_in_holes,
     mounting,
     part_at_wall,
+    thin_ribs,
 )
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
@@ -187,6 +189,21 @@ def test_a_part_over_an_edge_between_walls_has_an_opening_in_each(tmp_path: Path
     assert 1e3 * np.array([*end.size, *end.place]) == pytest.approx([15, 8, 30, 17.5, 19])
     assert (beside.way, end.way) == (pytest.approx((0, 1, 0)), pytest.approx((1, 0, 0)))
     assert 1e3 * np.array([beside.beyond, end.beyond]) == pytest.approx([5, 10])
+
+
+def test_openings_that_nearly_meet_leave_a_rib_too_thin_to_stand(tmp_path: Path) -> None:
+    """A bar through the wall at x = 30 mm, and on it a post through the ceiling at z = 40 mm."""
+    for gap, ribs in ((0.6, [math.hypot(0.6, 0.6)]), (2.0, [])):
+        bar = trimesh.creation.box((30, 12, 25 - gap))
+        bar.apply_translation((25, 0, 0.5 * (25 - gap)))  # from z = 15 to 40 - gap in the chamber
+        post = trimesh.creation.box((8, 12, 20))
+        post.apply_translation((30 - gap - 4, 0, 25))
+        body = trimesh.boolean.union([bar, post], engine="manifold")
+        found = find_openings(chamber_of(tmp_path, body, offset_mm=(25.0, 0.0)))
+        assert {one.wall for one in found} == {"the wall", "the ceiling"}
+        assert [1e3 * rib.width for rib in thin_ribs(found)] == pytest.approx(ribs, rel=1e-3)
+    corner = chamber_of(tmp_path, trimesh.creation.box((30, 20, 8)), offset_mm=(25.0, 20.0))
+    assert thin_ribs(find_openings(corner)) == []  # they meet at the edge
 
 
 def test_holes_of_a_part_in_the_plane_of_a_wall_are_no_openings(tmp_path: Path) -> None:

@@ -457,8 +457,9 @@ def test_larger_balls_are_taken_that_give_the_intensity_and_are_no_slower(
     assert taken is not None
     assert taken.made.design == larger.design
     reason = taken.made.reasons["shot.diameter_mm"]
-    assert reason.startswith("LARGER BALLS FOR THE INTENSITY: they touch 100% of the target")
-    assert "than 1 mm at 40 µm, which are too weak; 0% of the target lies in fillets" in reason
+    assert reason.startswith("LARGER BALLS FOR THE INTENSITY: by pilots 1 mm at 40 µm are")
+    assert "these touch 100% of the target" in reason
+    assert "and cover it no later; 0% of the target lies in fillets" in reason
     strong = pilot_of(0.12, 100.0)
     for other in (
         Compared(larger, pilot_of(0.12, 700.0)),  # later
@@ -478,7 +479,7 @@ def test_larger_balls_are_taken_that_give_the_intensity_and_are_no_slower(
     assert taken is not None
     assert taken.made.design == larger.design
     reason = taken.made.reasons["shot.diameter_mm"]
-    assert reason.startswith("FEWER BALLS: they touch 100% of the target, serve 100% and cover")
+    assert reason.startswith("FEWER BALLS: these touch 100% of the target, serve 100% and cover")
     assert "about as soon by pilots as 4,000 of 1 mm" in reason
     slow = good._replace(found=pilot_of(0.12, 700.0))
     assert larger_instead(enough._replace(made=many), [slow], trials, asked) is None
