@@ -306,7 +306,7 @@ def coverage_map(folder: Path) -> np.ndarray | None:
         picture = Path(own) / "coverage.png"
         if draw_coverage([folder], [""], picture) is not None:
             return None
-        return np.asarray(imread(picture))
+        return np.asarray(imread(picture))[..., :3]
 
 
 def draw_sheet(
