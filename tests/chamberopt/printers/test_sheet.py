@@ -312,7 +312,7 @@ def test_what_the_best_costs_is_on_the_sheet(folder: Path, monkeypatch: pytest.M
     speed = result.metrics["mean_normal_speed_m_s"]
     faster = Estimate(2.0 * speed.value, 0.1 * speed.value)
     start = SimpleNamespace(metrics={"mean_normal_speed_m_s": faster}, seeds=[-1])
-    monkeypatch.setattr("chamberopt.documents.sheet.load_start", lambda _: start)
+    monkeypatch.setattr("chamberopt.documents.sheet.expected.load_start", lambda _: start)
     told = rows_of(result)["Peening, and what to expect"][""]
     assert "It peens less hard than the start: the mean normal speed of the impacts" in told
 

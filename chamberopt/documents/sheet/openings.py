@@ -1,0 +1,149 @@
+"""Tell on a process sheet what holds the part, where it goes out, and what masks it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.chamber.checks.openings import PLATE, thin_ribs
+from chamberopt.chamber.checks.place_names import CEILING
+from chamberopt.chamber.fixture import plugs_in_words, size_in_words
+from chamberopt.documents.sheet.rows import MOST_ROWS, AsBuilt, Row, first_rows
+from chamberopt.documents.wording import plain
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.checks.openings import Mounting, Opening
+    from chamberopt.design.fixture import Holder
+    from chamberopt.results.load import Result
+
+SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wall is named by it
+EDGE, CLAMPED = 5e-5, 3e-3  # m: narrower openings are none; jaws take what stands out so far
+GUIDED = "guide it there in a bushing, stopped along its axis"  # of a part that turns
+MOUNTED: dict[Mounting, str] = {
+    "part goes in": "the part goes in from outside",
+    "wall goes over": "the wall goes over it from outside",
+    "split": "split the wall there",
+}
+OUTLINES = (
+    "What the part fills of the wall, seen from outside, without clearance. Dashed: where it goes "
+    "on over an edge of the wall."
+)
+
+
+def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
+    """Yield rows on what holds the part, where it goes out, and what masks it."""
+    holder, openings = result.design.holder, built.openings
+    held = "clamp it there" if result.design.effects.part_turn is None else GUIDED
+    if holder is not None and holder.kind == "bore":
+        play = "tight"
+        if holder.clearance_mm:
+            play = f"{plain(holder.clearance_mm)} mm of clearance all round, beyond the sizes below"
+        yield "holder", f"the part itself, out through the wall, {play}"
+    mask = result.design.mask
+    if holder is None and not result.record.chamber.pieces_in_air:
+        padded = mask is not None and mask.axis is not None and not openings
+        out = "the mask clamps it" if padded else "the part goes out through the wall"
+        yield "holder", f"none: {out}{'' if padded else f'; {held}'}"
+    rows = []
+    for number, way in enumerate(openings):
+        frame = "" if number else " in the chamber's frame"
+        how = f"; {MOUNTED[built.mountings[number]]}" if built.mountings else ""
+        beyond = _beyond(way, openings, held, how)
+        rows.append(("opening", f"{opening_in_words(way)} at {place_of(way)} mm{frame}; {beyond}"))
+    yield from first_rows(rows, "openings")
+    for rib in thin_ribs(openings):
+        both = " and ".join(f"the opening in {_wall_of(way)}" for way in (rib.one, rib.other))
+        width = plain(1e3 * rib.width, 2)
+        yield "no rib", f"{width} mm between {both} do not stand: cut both as one"
+    faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
+    for name, one in result.record.chamber.fixtures.items():
+        size = size_in_words(one.kind, one.size_mm)
+        if one.kind == "plugs":
+            sizes = f"{plugs_in_words(built.plugs)}, " if built.plugs else ""
+            size = f"{sizes}flush with their rims"
+        text = f"{one.kind} {size or 'up to the wall'}"
+        if one.length_mm:
+            text += f", {plain(one.length_mm)} mm long"
+        if one.place_mm and holder is not None:
+            at, along = (
+                ", ".join(plain(round(x, 3) + 0.0) for x in three)
+                for three in (one.place_mm, holder.axis)
+            )
+            text += f", from ({at}) mm along ({along}) in the chamber's frame"
+        if holder is not None and name == "holder":
+            text += _flanges(holder) + _grip(holder)
+        chosen = faces[name]
+        where = f" ({', '.join(chosen.surface)})" if chosen and chosen.surface != ("all",) else ""
+        yield name, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part{where}"
+
+
+def _flanges(holder: Holder) -> str:
+    """Return in words the flanges of an arbor, which mask the part's ends; "" without any."""
+    if holder.kind != "arbor" or holder.diameter_mm is None or holder.thickness_mm is None:
+        return ""
+    ends = "flanges at both ends" if holder.both_sides else "a flange at the end"
+    over = f", {plain(holder.grip_mm)} mm over it as a cup" if holder.grip_mm else ""
+    size = f"Ø {plain(holder.diameter_mm)} × {plain(holder.thickness_mm)} mm"
+    return f", with {ends} of the part, {size}{over}"
+
+
+def _grip(holder: Holder) -> str:
+    """Return in words how much of a collar or plate is round the part, and how it holds.
+
+    The text is empty for other holders.
+    """
+    if holder.kind not in ("collar", "plate") or not holder.grip_mm:
+        return ""
+    return f"; {plain(holder.grip_mm)} mm of it round the part, in two halves that clamp it"
+
+
+def opening_in_words(one: Opening) -> str:
+    """Return in words how large an opening is, and in which wall."""
+    sides = [plain(round(1e3 * x, 1) + 0.0) for x in one.size]
+    wall = _wall_of(one)
+    if one.form == "edge" or min(one.size) < EDGE:
+        return f"{sides[int(np.argmax(one.size))]} mm of {wall}, which ends on the part,"
+    if one.form == "round":
+        return f"round, Ø {plain(round(500.0 * sum(one.size), 1))} mm, in {wall}, its middle"
+    size = f"{' × '.join(sides)} mm"
+    if one.form == "other":
+        section = "along the part's section" if one.outline is None else "as on the last page"
+        return f"{section}, within {size}, in {wall}, its middle"
+    return f"{size} in {wall}, its middle"
+
+
+def place_of(one: Opening) -> str:
+    """Return the middle of an opening [mm] as text."""
+    return f"({', '.join(plain(round(1e3 * x, 1) + 0.0) for x in one.place)})"
+
+
+def _wall_of(one: Opening) -> str:
+    """Return in words in which wall an opening is."""
+    level = np.hypot(*one.way[:2]) or 1.0  # walls may lean
+    ways = zip("xy", (float(x / level) for x in one.way[:2]), strict=True)
+    at = next((f" at {'+−'[x < 0.0]}{axis}" for axis, x in ways if abs(x) > SQUARE), "")
+    return one.wall if one.wall == CEILING else f"{one.wall}{at}"
+
+
+def drawn_openings(built: AsBuilt) -> list[tuple[str, Opening]]:
+    """Return the openings that are cut along the part's section, each with its place in words."""
+    return [
+        (f"{_wall_of(one)}, middle at\n{place_of(one)} mm", one)
+        for one in built.openings
+        if one.form == "other" and one.outline is not None
+    ][:MOST_ROWS]
+
+
+def _beyond(one: Opening, openings: Sequence[Opening], held: str, mounted: str) -> str:
+    """Return in words how far the part stands out of an opening, and how it is held and mounted."""
+    if one.beyond < EDGE:
+        return f"the part fills it{mounted}"
+    farthest = max(other.beyond for other in openings)
+    clamp = f": {held}" if one.beyond >= min(CLAMPED, farthest) else ""
+    wider = ""
+    if one.wider is not None:
+        size = " × ".join(plain(round(1e3 * x, 1)) for x in one.wider)
+        wider = f"; it widens to {size} mm within {plain(1e3 * PLATE)} mm outside"
+    return f"the part stands out by {plain(1e3 * one.beyond, 2)} mm{clamp}{mounted}{wider}"

@@ -1,0 +1,261 @@
+"""Tell on a process sheet what an operator sets: part, chamber, sonotrode, shot and steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import PurePath
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chamberopt.chamber.layout.pose import axis_down
+from chamberopt.common.key_words import in_words
+from chamberopt.design.fixture import joint_in_words, slit_in_words, slit_mm
+from chamberopt.design.materials import alloys, find
+from chamberopt.design.tolerances import tolerance_box
+from chamberopt.documents.answer import answer_lines
+from chamberopt.documents.sheet.openings import fixture_rows, opening_in_words, place_of
+from chamberopt.documents.sheet.rows import (
+    AsBuilt,
+    Row,
+    amplitude_text,
+    face_in_words,
+    first_rows,
+    key_row,
+    weighed_g,
+    with_limits,
+)
+from chamberopt.documents.study import exposed_target
+from chamberopt.documents.wording import per_cent, plain
+from chamberopt.documents.zones import turned
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.checks.strips import StripOfTarget
+    from chamberopt.results.load import Result
+
+LEAST_SLIT_MM = 0.2  # of both sides of a face, by heart: it vibrates and must touch nothing
+SAME_MM = 0.02  # lengths that differ by less count as equal
+MOST_KEYS = 8  # numbers of the chamber
+LEAST_MISSED = 5e-4  # share of the target out of reach that is told
+
+
+def chamber_limits(result: Result) -> dict[str, tuple[float, float, float]]:
+    """Return value, least and largest value of each key of [chamber] that has a tolerance."""
+    box = tolerance_box(result.design)
+    return {
+        name.removeprefix("chamber."): (result.design.value(name), *ends)
+        for name, ends in box.items()
+        if name.startswith("chamber.")
+    }
+
+
+def slit_limits(result: Result) -> dict[str, tuple[float, float, float]]:
+    """Return value, least and largest value of each key of [chamber] as wide as the sonotrode.
+
+    A wall round the sonotrode's face stands beside it by a slit, which is not simulated.
+    """
+    face, chamber = result.design.sonotrode.face, result.design.chamber
+    if face is None:
+        return {}
+    long, wide = face.sides_mm
+    sides = {"diameter_mm": face.diameter_mm}
+    if face.diameter_mm is None:
+        sides = {"length_mm": long, "width_mm": wide}
+    slit = 2.0 * slit_mm(1e3 * min(result.design.ball_diameters))
+    least = min(LEAST_SLIT_MM, 0.5 * slit)
+    return {
+        key: (side, side + least, side + slit)
+        for key, side in sides.items()
+        if side is not None and abs(getattr(chamber, key, math.inf) - side) < SAME_MM
+    }
+
+
+def _over_face(result: Result) -> str:
+    """Return in words along which sides of the chamber its walls end over a larger face."""
+    face, chamber = result.design.sonotrode.face, result.design.chamber
+    if face is None or face.diameter_mm is not None or chamber.shape != "box":
+        return ""
+    sides = zip(("length_mm", "width_mm"), face.sides_mm, strict=True)
+    over = [in_words(key) for key, side in sides if getattr(chamber, key) < side - SAME_MM]
+    return " and the ".join(over)
+
+
+def part_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
+    strip = built.strip
+    part, turn = result.design.part, result.design.effects.part_turn
+    yield "part", part.mesh_path.name
+    yield "metal", _metal(result)
+    if result.design.chamber.shape == "imported":
+        yield "pose", "as drawn with its chamber"
+    else:
+        down = axis_down(part.rotate_deg).replace("-", "−")
+        pose = [turned(part.rotate_deg) or "as in its file", f"{down} down" if down else ""]
+        yield "turned", ": ".join(filter(None, pose))
+        x, y = part.offset_mm
+        yield "offset from the axis", f"x {plain(x)} mm, y {plain(y)} mm" if x or y else "none"
+        text = f"{plain(result.design.chamber.sonotrode_distance_mm)} mm"
+        yield (
+            "sonotrode to lowest point",
+            with_limits(result, "chamber.sonotrode_distance_mm", text),
+        )
+    if turn is not None:
+        swing = (
+            f"{plain(turn.angle_deg or 0.0)}° to each side at {plain(turn.frequency_hz or 0)} Hz"
+        )
+        axis = ", ".join(plain(one) for one in turn.axis)
+        speed = swing if turn.rpm is None else f"{plain(turn.rpm)} turns a minute"
+        yield "turns", f"{speed} about the file's axis ({axis})"
+    if area := exposed_target(result):
+        yield "target", area
+    # A strip is told in a row of its own.
+    chosen = part.target.model_copy(update={} if strip is None else {"box_mm": None})
+    if words := chosen.in_words:
+        radii = " and ".join(plain(1e3 * one) for one in built.radii)
+        yield "target, chosen by", f"fillets of {radii} mm: {words}" if radii else words
+    if strip is not None:
+        yield "a strip at a time", _of_strip(strip)
+
+
+def _of_strip(strip: StripOfTarget) -> str:
+    """Return in words which strip of the target is peened, and how the part moves for the next."""
+    low, high, length = (
+        plain(round(1e3 * x, 1) + 0.0) for x in (strip.low, strip.high, strip.high - strip.low)
+    )
+    axis = "xyz"[strip.axis]
+    return (
+        f"setting {strip.before + 1} of {strip.settings}: {axis} {low} to {high} mm of its file; "
+        f"the part is moved by {length} mm along that {axis} from one to the next, and each takes "
+        "the peening time"
+    )
+
+
+def _metal(result: Result) -> str:
+    """Return the part's metal and hardness in words, and how surely the hardness is known."""
+    part = result.design.materials.part
+    text, alloy = f"{part.alloy or 'not named'}, {plain(part.hardness_HB)} HB", None
+    if part.alloy:
+        alloy = find(part.alloy, alloys())
+    if alloy is None or alloy.hardness_HB != part.hardness_HB:
+        return f"{text}, as given"
+    return f"{text}: the catalogue's, {alloy.origin}, for {alloy.condition}; measure yours"
+
+
+def chamber_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
+    table = result.design.chamber.model_dump(mode="json", exclude_none=True)
+    wall = result.design.materials.wall.alloy
+    yield "shape", PurePath(table.pop("shape")).name + (f", walls of {wall}" if wall else "")
+    for key in ("sonotrode_distance_mm", "facets", "mesh", "unit"):
+        table.pop(key, None)
+    counted = {key: table.pop(key, ()) for key in ("holes", "deflectors")}
+    rows = []
+    for key, value in table.items():
+        if value not in (0, 0.0, []):
+            name, text = key_row(key, value)
+            rows.append((name, with_limits(result, f"chamber.{key}", text)))
+    yield from first_rows(rows, "numbers", MOST_KEYS)
+    for what, several in counted.items():
+        if several:
+            yield what, f"{len(several)}: see the report"
+    yield from fixture_rows(result, built)
+    ball = 1e3 * min(result.design.ball_diameters)
+    holder = result.design.holder
+    in_bore = holder is not None and holder.clearance_mm > 0.0
+    places = "round the part as above, of all other joints" if in_bore else "of joints and openings"
+    slit = f"round the sonotrode {slit_in_words(ball)}"
+    yield "gaps", f"{places} {joint_in_words(ball)}, or sealed; {slit}"
+    if volume := result.record.chamber.volume_mm3:
+        yield "free volume", f"{plain(1e-3 * volume)} cm³"
+
+
+def sonotrode_rows(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
+    design = result.design
+    face = design.sonotrode.face
+    if face is not None:
+        alike = ", driven alike: simulated as one face" if face.count > 1 else ""
+        yield "stands on", f"{face.in_words}{alike}"
+    metal = design.materials.sonotrode.alloy
+    yield "face in the chamber", face_in_words(face_mm) + (f", {metal}" if metal else "")
+    if limits := slit_limits(result):
+        sides = [
+            f"{in_words(key)} {plain(low)} to {plain(high)} mm, so that it is clear of the face"
+            for key, (_, low, high) in limits.items()
+        ]
+        yield "wall round the face", "; ".join(sides)
+    gap = slit_in_words(1e3 * min(design.ball_diameters))
+    if over := _over_face(result):
+        yield "walls over the face", f"at both ends of the {over}, clear of it by {gap}"
+    if face is not None and face.count > 1:
+        yield "gaps between the blocks", f"{gap}, half a ball"
+    yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"
+    yield "amplitude", amplitude_text(design.sonotrode)
+    yield "peak speed of the face", f"{plain(design.sonotrode.peak_speed, 3)} m/s"
+    if design.sonotrode.amplitude_profile is not None:
+        yield "amplitude over the face", design.sonotrode.amplitude_profile.in_words
+    if design.calibration is not None:
+        factor = plain(design.calibration.factor("amplitude"), 3)
+        yield "calibrated to", f"{factor} times the amplitude that is set"
+    others = []
+    for one in design.sonotrodes:
+        place = ", ".join(map(plain, one.at_mm))
+        name = f"further, Ø {plain(one.diameter_mm)} mm"
+        others.append((name, f"at ({place}) mm: {amplitude_text(one)}"))
+    yield from first_rows(others, "sonotrodes")
+
+
+def shot_rows(result: Result) -> Iterator[Row]:
+    shot = result.design.shot
+    yield (
+        "material",
+        f"{(shot.material or 'not named').replace('_', ' ')}, {plain(shot.density)} kg/m³",
+    )
+    several, sizes = len(shot.sizes) > 1, []
+    for diameter, count in shot.sizes:
+        mass = 1e3 * shot.density * np.pi / 6.0 * diameter**3 * count
+        text = f"{count:,} of Ø {plain(1e3 * diameter)} mm"
+        sizes.append(("balls", f"{text}, {plain(mass, 3)} g" if several else text))
+    yield from first_rows(sizes, "sizes")
+    asked = with_limits(result, "shot.mass_g", f"asked: {plain(shot.mass_g)} g")
+    yield "mass of these balls", f"{plain(weighed_g(shot), 3)} g ({asked})"
+    for name, one in result.design.in_steps.items():
+        if one.shot != shot:
+            counts = (f"{count:,} of Ø {plain(1e3 * size)} mm" for size, count in one.shot.sizes)
+            yield f"balls, step {name}", f"{', '.join(counts)}: {plain(weighed_g(one.shot), 3)} g"
+
+
+def step_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
+    """Yield a row for each step, and for each of its openings if they are not those of the first.
+
+    The drawing and the other tables are of the first.
+    """
+    if result.design.steps:
+        yield "", "Tables and the drawing here are of the first step; the others differ from it:"
+    yield from (("", one.text) for one in answer_lines(result) if one.about == "step")
+    first, *others = (
+        [f"{opening_in_words(one)} at {place_of(one)} mm" for one in openings]
+        for openings in (built.openings, *built.later)
+    )
+    for number, found in enumerate(others, start=2):
+        if found != first:
+            yield from first_rows([(f"opening, step {number}", one) for one in found], "openings")
+
+
+def run_rows(result: Result) -> Iterator[Row]:
+    """Yield what an operator does for each part, in its order."""
+    design = result.design
+    if design.effects.part_turn is not None:
+        yield "1 mount", "the part and its drive; turn it once by hand: it touches no wall"
+    else:
+        yield "1 mount", "the part as above; measure from it to the face at rest"
+    steps = [*design.in_steps.values()]
+    yield "2 fill", f"{plain(weighed_g(steps[0].shot), 3)} g of balls, weighed; close the chamber"
+    each = ", then ".join(
+        f"{plain(one.process.treatment_time)} s as step {k}" for k, one in enumerate(steps, 1)
+    )
+    time = f"{plain(design.process.treatment_time)} s"
+    yield "3 peen", f"{time}: {each} (see Steps)" if design.steps else time
+    yield "4 weigh", "the balls again: what lacks is in a gap or in the part"
+    missed = 1.0 - result.record.field.reachable_share
+    but = f" but the {per_cent(missed)} that no ball can touch: see Warnings"
+    look = "at the target through a lens of 10 times: no place without dents"
+    yield "5 look", look + (but if missed > LEAST_MISSED else "")
