@@ -175,7 +175,8 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
     # A straight end is held better than one that narrows to its tip, and a slim one better still.
     share = END if max(straight(1.0, END), straight(-1.0, END)) > STRAIGHT else LONG_END
     across = float(np.ptp(np.delete(mesh.vertices, axis, axis=1), axis=0).min())
-    share = max(share, min(STUBBY * across / length + BESIDE, LONG_END))
+    least = max(STUBBY * across / length + BESIDE, (INSIDE + DEEP) / length)
+    share = max(share, min(least, LONG_END))
     upper, lower = (straight(way, share) for way in (1.0, -1.0))
     slimmer = size(-1.0) < SLIMMER * size(1.0)
     if slimmer if abs(upper - lower) < ALIKE else lower > upper:

@@ -34,7 +34,10 @@ if TYPE_CHECKING:
     from chamberopt.documents.coverage import Figure
     from chamberopt.results.load import Result
 
-TIME = "time_to_98_s"
+TIME, UNIFORM = "time_to_98_s", "uniform_coverage"
+UNIFORM_IS = (
+    "Uniform coverage is the mean less the standard deviation over the target: 1 if all is covered."
+)
 EXPECTED = (
     "mean_coverage",
     "p05_coverage",
@@ -64,7 +67,8 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
     yield "peening time", with_limits(result, "process.treatment_time_s", time)
     yield from wanted_rows(result)
     calibration = result.design.calibration
-    for row in expected_figures(result):
+    shown = expected_figures(result)
+    for row in shown:
         more = f"; range {row.range_with_unit}" if row.range_text else ""
         yield row.label.text, f"{row.label.format(row.result)}{more}"
     if slow := time_at_slow_end(result):
@@ -84,6 +88,8 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
             yield "", first
             if rest:  # a row of its own: a long one is cut
                 yield "", f"{over.strip()}{rest}"
+    if UNIFORM in [row.name for row in shown]:
+        yield "", UNIFORM_IS
     yield "", f"± 95 % intervals. {limits_of_intervals(result, has_groups=True)}"
 
 

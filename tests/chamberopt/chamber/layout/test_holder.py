@@ -241,13 +241,13 @@ def test_a_part_that_is_all_target_is_held_by_its_slimmer_end() -> None:
     assert end is not None
     assert end.turns == (180.0, 0.0, 0.0)
     middle = body.triangles_center[:, 2]
-    assert (end.triangles == (middle < 0.15 * 70)).all()
+    assert (end.triangles == (middle < 6 + 7.5)).all()  # in the chamber, and what jaws need
     assert (end.target.triangles == ~end.triangles).all()
-    assert end.target.keys["box_mm"][0][2] == end.at["box_mm"][1][2] == 10.5
+    assert end.target.keys["box_mm"][0][2] == end.at["box_mm"][1][2] == 13.5
     holder = end_holder(mesh, end.target.triangles, end.turns, BALL, end.triangles)
     assert holder is not None
     assert (holder.keys["kind"], holder.keys["diameter_mm"]) == ("collar", 20.0)
-    assert 8.5 < holder.keys["grip_mm"] <= 10.5 - 1e3 * BALL
+    assert 11.5 < holder.keys["grip_mm"] <= 13.5 - 1e3 * BALL
     assert held_end(mesh, end.target, (0.0, 0.0, 0.0)) is None  # not all of it is target
     assert held_end(mesh, whole, (30.0, 0.0, 0.0)) is None  # no axis of the file is upright
 
