@@ -99,7 +99,9 @@ def without_twin(panels: Sequence[Panel]) -> list[Panel]:
     """
     if len(panels) == 2:
         one, other = (panel.view.image.astype(float) for panel in panels)
-        if one.shape == other.shape and np.abs(one - other).mean() < ALIKE:
+        # Seen from opposite sides, what is alike is also mirrored.
+        both = (other, other[:, ::-1]) if one.shape == other.shape else ()
+        if any(np.abs(one - seen).mean() < ALIKE for seen in both):
             return [panels[0]._replace(caption=ALIKE_CAPTION)]
     return [*panels]
 

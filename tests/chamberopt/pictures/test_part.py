@@ -10,6 +10,7 @@ from matplotlib.image import imread
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import load_design
+from chamberopt.pictures.panels import ALIKE_CAPTION, without_twin
 from chamberopt.pictures.part import (
     CLEAR,
     HELD,
@@ -20,6 +21,8 @@ from chamberopt.pictures.part import (
     draw_part,
     draw_target,
 )
+from chamberopt.pictures.picture_page import Panel
+from chamberopt.pictures.view import View
 from chamberopt.results.vtp_files import MM, cavity_surface
 from tests.helpers.opengl import needs_opengl
 
@@ -80,3 +83,17 @@ def test_a_part_is_drawn_only_where_there_can_be_such_a_file(tmp_path: Path) -> 
     for name, said in (("part.jpg", r"\.png"), ("nowhere/part.png", "does not exist")):
         with pytest.raises(InputError, match=said):
             draw_part(np.zeros((1, 3, 3)), "a part", tmp_path / name)
+
+
+def test_views_that_show_the_same_or_its_mirror_image_are_one() -> None:
+    image = np.random.default_rng(3).integers(0, 255, (40, 60, 3)).astype(np.uint8)
+
+    def panel(shown: np.ndarray) -> Panel:
+        return Panel(View(shown, np.eye(3), np.zeros(2), 1.0), "the target")
+
+    first = panel(image)
+    for other in (image, image[:, ::-1]):
+        (one,) = without_twin([first, panel(other)])
+        assert (one.view, one.caption) == (first.view, ALIKE_CAPTION)
+    for other in (image[::-1], image[:, :50]):
+        assert len(without_twin([first, panel(other)])) == 2
