@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from chamberopt.pictures.part3d import PartScene
     from chamberopt.results.load import Result
     from chamberopt.results.records import CoverageAtTime, FieldRecord
+    from chamberopt.simulation.evaluation import Evaluation
 
 # The figures that a terminal shows besides the objective.
 MAIN = (
@@ -271,3 +272,19 @@ def _windows(field: FieldRecord) -> tuple[Sentence, Fold]:
     ]
     caption = f"In windows of {plain(4.0 * field.gauge_mm2)} mm², twice as wide"
     return Sentence(text), Fold(caption, [Table("", ("", "± 95 %"), wide)])
+
+
+def summary(evaluation: Evaluation | Result) -> str:
+    """Return a line of text with the objective, and with mean and standard deviation of coverage.
+
+    Each of these numbers has its interval.
+    """
+    mean, spread = (
+        metric_label(name).format(evaluation.metrics[name])
+        for name in ("mean_coverage", "std_coverage")
+    )
+    goal = objective_label(evaluation.objective_name)
+    windows = f"in windows of {plain(evaluation.gauge_mm2)} mm²"
+    return (
+        f"{goal.text} {goal.format(evaluation.objective)}   mean {mean}   std {spread}   {windows}"
+    )

@@ -223,8 +223,23 @@ def _sentence(made: Proposal) -> str:
     return (
         f"Peen {one_line(_target(made))} ({area}{strips}) of "
         f"{one_line(design.part.mesh_path.name)} for {_time(made)} with {balls}, the sonotrode at "
-        f"{design.sonotrode.zero_to_peak_um:g} µm zero-to-peak."
+        f"{design.sonotrode.zero_to_peak_um:g} µm zero-to-peak.{_intensity(made)}"
     )
+
+
+def _intensity(made: Proposal) -> str:
+    """Return a sentence on the expected intensity beside the usual or wanted one, if known."""
+    if made.expected is None:
+        return ""
+    aim = ""
+    if made.usual is not None:
+        off = made.usual.off(made.expected.value)
+        is_inside = made.usual.low <= made.expected.value <= made.usual.high
+        side = "below" if off < 0.0 else "above" if off > 0.0 else "close to"
+        side = "within" if is_inside else side
+        kind = "usual" if made.design.process.intensity_mmA is None else "wanted"
+        aim = f", {side} the {kind} {made.usual.low:g} to {made.usual.high:g} mmA"
+    return f" Almen intensity about {plain(made.expected.value, 2)} mmA{aim}."
 
 
 def _time(made: Proposal) -> str:

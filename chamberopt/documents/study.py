@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.common.estimate import Estimate, finite_or_none
 from chamberopt.common.files import read_file
 from chamberopt.common.key_words import AIMS, inner_first, title_with_unit, unit_of
 from chamberopt.documents.document import (
@@ -220,8 +219,7 @@ def evaluated(one: Trial, label: Label) -> EvaluatedCandidate:
     """Return a trial as charts show it, in the unit of the objective's label."""
     objective = one.objective
     if objective is not None:
-        half_width = finite_or_none(objective.half_width) or 0.0
-        objective = label.scale(Estimate(objective.value, half_width))
+        objective = label.scale(objective)
     return EvaluatedCandidate(one.number + 1, one.stage, objective, one.feasible, one.parameters)
 
 

@@ -554,18 +554,23 @@ def _told_of(file: EditedFile) -> dict[str, object]:
 def _taken(design: Design, matter: str) -> list[dict[str, object]]:
     """Return words, and changes of a design, for balls and amplitudes that a matter names.
 
-    The list is empty for a design of several steps, or with balls of several sizes.
+    With balls of another size their mass is another too, so that they lie in as many layers on the
+    sonotrode. The list is empty for a design of several steps, or with balls of several sizes.
     """
     if design.steps or design.shot.diameter_mm is None:
         return []
     face = design.sonotrode
     key = f"sonotrode.{face.amplitude_key}"
-    balls = [(f"balls of {one:g} mm", "shot.diameter_mm", one) for one in balls_named(matter)]
-    waves = [
-        (f"{one:g} µm zero-to-peak", key, face.per_amplitude * one)
+    found: list[tuple[str, dict[str, float]]] = []
+    for ball in balls_named(matter):
+        mass = float(f"{design.shot.mass_g * ball / design.shot.diameter_mm:.2g}")
+        changes = {"shot.diameter_mm": ball, "shot.mass_g": mass}
+        found.append((f"balls of {ball:g} mm, {mass:g} g", changes))
+    found += [
+        (f"{one:g} µm zero-to-peak", {key: face.per_amplitude * one})
         for one in amplitudes_named(matter)
     ]
-    return [{"label": f"take {text}", "changes": {at: one}} for text, at, one in balls + waves]
+    return [{"label": f"take {text}", "changes": changes} for text, changes in found]
 
 
 def _chosen(design: Design, table: str) -> dict[str, object]:

@@ -56,7 +56,7 @@ class Front:
     def __init__(self, folder: Path, file: Path | None, trusted: bool) -> None:
         self._folder, self._trusted = folder.resolve(), trusted
         self.command = OneCommand()
-        self._asked: dict[str, object] = {}  # part, unit and target of the newest proposal
+        self._asked: dict[str, object] = {}  # part, unit, wishes and target of the newest proposal
         self._first = file.name if file is not None and is_mesh_name(file.name) else ""
         self.acts = None if file is None or self._first else Acts(file, trusted, self.command)
 
@@ -210,7 +210,7 @@ class Front:
         arguments += [] if asked["pilot"] else ["--no-pilot"]
         out = free_folder(self._folder, Path(part.stem))
         started = self.command.start([*arguments, JSON, f"--out={out}"], self._folder, out)
-        self._asked = {key: asked[key] for key in ("part", "unit", "target")}
+        self._asked = dict(asked)
         return started
 
     def open(self, asked: Any) -> dict[str, object]:

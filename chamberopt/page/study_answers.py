@@ -254,11 +254,11 @@ def _kind(trial: Trial) -> str:
     return "refused" if trial.refused or trial.highest is not None else "failed"
 
 
-def _interval(estimate: Estimate | None) -> list[float] | None:
-    """Return value and half-width; the half-width is 0 where it is not known, as in charts."""
+def _interval(estimate: Estimate | None) -> list[float | None] | None:
+    """Return value and half-width; the half-width is None where it is not resolved."""
     if estimate is None:
         return None
-    return [estimate.value, finite_or_none(estimate.half_width) or 0.0]
+    return [estimate.value, finite_or_none(estimate.half_width)]
 
 
 def _second(trial: Trial, labels: Sequence[Label]) -> Estimate | None:

@@ -28,6 +28,7 @@ from chamberopt.results.vtp_files import MM, ZONE, Surface, fixture_marks
 
 # A triangle takes about 80 bytes of the page. Up to this number the page stays below 60 MB.
 MAX_TRIANGLES = 600_000
+BESIDE = 0.35  # room round the target that is looked at first, in lengths of its diagonal
 DISTANCE = 2.2  # distance of the camera, in lengths of the cavity's diagonal
 EDGE_ANGLE = 30.0  # degrees; sharper edges of the chamber are drawn
 SATURATED = 95.0  # %; where nearly all of the target has more, coverage tells no places apart
@@ -140,7 +141,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         },
         "whole": is_closed and rest is not None,  # so that a section can fill the part
         "edges": {"ends": _packed(_edges(chamber, np.asarray(chamber["tag"]))), "colour": EDGES},
-        "view": _view(chamber, eye),
+        "view": _view(chamber, part, eye),
     }
     return PartScene(data, tuple(remarks), coverage, area, is_saturated)
 
@@ -206,9 +207,16 @@ def _shape(points: np.ndarray, triangles: np.ndarray) -> dict[str, object]:
     return {"points": _packed(points), "triangles": _packed(triangles, "<i4")}
 
 
-def _view(chamber: Surface, eye: np.ndarray) -> dict[str, object]:
-    """Return the middle of the cavity, and the camera's position and viewing size [mm]."""
-    around = np.asarray(chamber.points, dtype=float)
+def _view(chamber: Surface, part: DrawnPart, eye: np.ndarray) -> dict[str, object]:
+    """Return the middle of what is looked at first, and the camera's position and size [mm].
+
+    It is the target with what is near to it, and no more than the cavity.
+    """
+    target = np.asarray(part.target.points, dtype=float)
+    low, high = target.min(axis=0), target.max(axis=0)
+    beside = BESIDE * float(np.linalg.norm(high - low))
+    cavity = np.reshape(chamber.bounds, (3, 2)).T
+    around = np.clip([low - beside, high + beside], *cavity)
     size = float(np.linalg.norm(np.ptp(around, axis=0)))
     middle = 0.5 * (around.min(axis=0) + around.max(axis=0))
     return {

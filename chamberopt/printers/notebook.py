@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import private_folder, read_file
+from chamberopt.documents.coverage import summary
 from chamberopt.documents.document import Section
 from chamberopt.documents.overview import (
     comparison_overview,
@@ -29,7 +30,6 @@ from chamberopt.pictures.part import draw_part
 from chamberopt.pictures.part3d import PartScene
 from chamberopt.printers import html
 from chamberopt.printers.report_page import part_page
-from chamberopt.results.load import summary
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber

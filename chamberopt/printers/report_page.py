@@ -11,14 +11,14 @@ from pathlib import Path
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, read_file, require_place, write_text
-from chamberopt.documents.coverage import TELLS_APART
+from chamberopt.documents.coverage import TELLS_APART, summary
 from chamberopt.documents.document import Document, Items, PartView, Section
 from chamberopt.documents.report import report
 from chamberopt.pictures.charts.colours import KINDS, hex_colours
 from chamberopt.pictures.part3d import PartScene, part_scene, quantities_in_all
 from chamberopt.pictures.quantities import TIME_TO_98
 from chamberopt.printers import html
-from chamberopt.results.load import START, Result, load_result, summary
+from chamberopt.results.load import START, Result, load_result
 
 REPORT = "report.html"
 GENERATOR = '<meta name="generator" content="chamberopt'

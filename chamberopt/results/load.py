@@ -17,7 +17,6 @@ from chamberopt.common.estimate import Estimate
 from chamberopt.common.files import INPUTS, RESULT, open_plain, require_plain_folder
 from chamberopt.common.limits import MAX_RESULT_BYTES, parse_json, read_limited
 from chamberopt.common.notebook import ShownInNotebook
-from chamberopt.common.number_text import estimate_text, plain
 from chamberopt.coverage.metrics import find_metric
 from chamberopt.design.design import validate
 from chamberopt.design.load import Design
@@ -31,7 +30,7 @@ from chamberopt.results.records import (
 from chamberopt.search.trial_log import HISTORY, TIMINGS, Trial, read_trials
 
 if TYPE_CHECKING:
-    from chamberopt.simulation.evaluation import Evaluation
+    pass
 
 START = "start"
 # Folders of other commands, recognised by a file: name of the folder, and how to look at it.
@@ -196,18 +195,6 @@ def file_sha256(path: Path) -> str:
         raise InputError(
             f"{path}: cannot be read: {error.strerror}; check its permissions"
         ) from None
-
-
-def summary(evaluation: Evaluation | Result) -> str:
-    """Return a line of text with the objective, and with mean and standard deviation of coverage.
-
-    Each of these numbers has its interval.
-    """
-    mean, spread = (evaluation.metrics[name] for name in ("mean_coverage", "std_coverage"))
-    name = evaluation.objective_name.replace("_", " ")
-    shares = f"mean {estimate_text(mean, 100.0, '%')}   std {estimate_text(spread, 100.0, '%')}"
-    windows = f"in windows of {plain(evaluation.gauge_mm2)} mm²"
-    return f"{name} {estimate_text(evaluation.objective)}   {shares}   {windows}"
 
 
 @contextmanager

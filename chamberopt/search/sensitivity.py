@@ -11,7 +11,7 @@ A range counts what the model does not know. The mean alone would promise too mu
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,6 +45,15 @@ class Slice:
     # with 95 % confidence: from, to; or all of these texts.
     flat: tuple[float | str, ...]
     texts: tuple[str, ...] = ()  # that it may be
+
+    def scaled(self, factor: float) -> Slice:
+        """The same of the score times a factor, such as -1 for what is the better the smaller."""
+        return replace(
+            self,
+            mean=factor * self.mean,
+            half_width=abs(factor) * self.half_width,
+            effect=factor * self.effect,
+        )
 
 
 @dataclass(frozen=True)

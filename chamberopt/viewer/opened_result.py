@@ -13,10 +13,11 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import counted
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
 from chamberopt.coverage.part_impacts import HITS_FILE, HitsByTriangle, load_matching_hits
+from chamberopt.documents.coverage import summary
 from chamberopt.pictures.drawn_part import DrawnPart, colour_range
 from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.results.arrays_file import ARRAYS_FILE, read_result_arrays
-from chamberopt.results.load import Result, summary, unchanged_file
+from chamberopt.results.load import Result, unchanged_file
 from chamberopt.results.vtp_files import PART, ZONE
 from chamberopt.viewer.view_state import ViewState
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import make_folder, write_text
 from chamberopt.documents.comparison import comparison_lines
+from chamberopt.documents.coverage import summary
 from chamberopt.pictures.comparison import draw_distributions
 from chamberopt.pictures.coverage import draw_coverage
 from chamberopt.pictures.difference import draw_difference, write_differences
@@ -22,7 +23,6 @@ from chamberopt.results.compare.local_difference import (
     local_difference,
     read_target_surface,
 )
-from chamberopt.results.load import summary
 from chamberopt.workflows.compared_candidates import read_candidates, simulate_missing
 from chamberopt.workflows.simulate import Teller
 

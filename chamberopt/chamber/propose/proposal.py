@@ -24,7 +24,7 @@ from chamberopt.chamber.shop import Shop, ShopSonotrode
 from chamberopt.common.errors import InputError
 from chamberopt.common.toml_fields import allowed_range
 from chamberopt.design.design import Design, validate
-from chamberopt.design.intensity import PredictedIntensity
+from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
 from chamberopt.design.shape_surface import TAG_SONOTRODE
 from chamberopt.design.shapes.base import ParametricChamber
 from chamberopt.design.shot import ShotTable
@@ -146,6 +146,9 @@ class Proposal:
     # Dents in a window that the peening strength takes, by a pilot; 0 if no intensity is wanted.
     strength_dents: float = 0.0
     predicted: PredictedIntensity | None = None  # by that pilot
+    # Almen intensity of the proposal as it stands, and what is aimed at or is usual.
+    expected: PredictedIntensity | None = None
+    usual: WantedIntensity | None = None
     # Balls of several sizes that pilots compared, the smallest first; none without a pilot.
     trials: tuple[BallTrial, ...] = ()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -16,7 +17,9 @@ from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.propose.proposal import Proposal, checked, with_table
 from chamberopt.chamber.propose.proposed_mask import rows_of
 from chamberopt.chamber.shop import Shop
+from chamberopt.common.number_text import plain
 from chamberopt.design.fixture import WIDEST_GAP, tight_gap_mm
+from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.outline import fitted_circle, frame_along
 from chamberopt.geometry.triangles import unit_normals
 
@@ -27,6 +30,9 @@ MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area 
 # Of a round face: how far its corners may be off a circle, over its radius, and the sum of its area
 # vectors over its area.
 OFF_ROUND, ALL_WAYS = 0.02, 0.2
+# Faces that are looked at for it, which end where they turn by so much; cosine up to which a face
+# is a side; and least share of a round's surface that a keyway and facets leave.
+MOST_FACES, CREASE_DEG, LEVEL, SLOTTED = 8, 30.0, 0.02, 0.8
 # Of a part that turns: ball diameters between it and the walls, so that no ball is jammed there,
 # and m between its axis and the middle of an opening.
 FREE, OFF_AXIS = 1.0, 2e-4
@@ -138,7 +144,8 @@ def bore_clearance_mm(ball: float) -> float:
 def _clamp(made: Proposal) -> Clamp:
     """Return what a part that stands out of its chamber is clamped by there.
 
-    It is two flat faces that jaws reach far over, or else surfaces by name, round ones first.
+    It is two flat faces that jaws reach far over, or else the largest round, or else surfaces by
+    name.
     """
     chamber, part = made.chamber, made.chamber.part
     low, high = (end(chamber.vertices, axis=0) for end in (np.min, np.max))
@@ -149,23 +156,17 @@ def _clamp(made: Proposal) -> Clamp:
     jaws = flat_jaws(part.vertices, part.triangles, outside)
     if jaws.text and not jaws.is_shallow:
         return jaws
+    axes = {"xyz".index(side[-1]) for side in _sides_out(made)}
+    if radius := _round_end(part.vertices, part.triangles, outside, axes):
+        return Clamp(f"a collet or vee blocks round its diameter of {plain(2e3 * radius)} mm")
+    if jaws.text:
+        return jaws
     known = [
         (one, np.where(rows_of(made.design, one.keys), outside, 0.0))
         for one in named_or_all(made.known)
     ]
-    # One round face is held better than many flanks, such as those of splines.
-    axes = {"xyz".index(side[-1]) for side in _sides_out(made)}
-    rounds = [
-        (one, each)
-        for one, each in known
-        if not any("alike" in face for face in one.keys.get("faces", ()))
-        and any(_is_round(corners, each, k) for k in axes)
-    ]
-    used = rounds or ([] if jaws.text else known)
-    areas = apart([(one, float(each.sum()), each) for one, each in used if each.any()])
+    areas = apart([(one, float(each.sum()), each) for one, each in known if each.any()])
     most = [(one, area) for one, area in areas if area > JAW_SHARE * areas[0][1]]
-    if not most:
-        return jaws
     named = (f"{one.name} ({area_in_mm2(area)} of it)" for one, area in most[:MOST_JAWS])
     return Clamp(", ".join(named))
 
@@ -181,10 +182,32 @@ def _sides_out(made: Proposal) -> list[str]:
     )
 
 
-def _is_round(corners: np.ndarray, outside: np.ndarray, axis: int) -> bool:
-    """Return whether what stands out of a surface is a round about an axis that a clamp holds.
+def _round_end(
+    vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray, axes: Iterable[int]
+) -> float:
+    """Return the radius [m] of the largest round that stands out of a chamber; 0 without any.
 
-    All of it is as far from the axis, it goes all round, it is no bore, and it is long enough.
+    Args:
+        vertices, triangles: the part, (n, 3) [m] and (m, 3).
+        outside: area of each triangle that may be clamped [m²], (m,).
+        axes: numbers of the axes along which it stands out.
+    """
+    faces, corners = Faces(vertices, triangles, CREASE_DEG), vertices[triangles]
+    normals, found = unit_normals(corners), [(0.0, 0.0)]
+    for axis in axes:
+        aside = np.where(np.abs(normals[:, axis]) < LEVEL, outside, 0.0)
+        areas = np.bincount(faces.of_triangle, aside, faces.count)
+        for face in np.argsort(-areas, kind="stable")[:MOST_FACES]:
+            own = np.where(faces.of_triangle == face, aside, 0.0)
+            found.append((float(areas[face]), _round_radius(corners, own, axis)))
+    return max((one for one in found if one[1] > 0.0), default=(0.0, 0.0))[1]
+
+
+def _round_radius(corners: np.ndarray, outside: np.ndarray, axis: int) -> float:
+    """Return the radius [m] of what stands out if it is a round about an axis; 0 if it is none.
+
+    All of it is as far from the axis, it goes all round, it is no bore, and it is long enough for a
+    clamp.
 
     Args:
         corners: of all triangles of the part [m], (m, 3, 3).
@@ -193,7 +216,7 @@ def _is_round(corners: np.ndarray, outside: np.ndarray, axis: int) -> bool:
     """
     own = outside > 0.0
     if not own.any():
-        return False
+        return 0.0
     across = np.delete(corners[own], axis, axis=2).reshape(-1, 2)
     middle, radius = fitted_circle(across)
     off = np.abs(np.linalg.norm(across - middle, axis=1) - radius).max()
@@ -201,5 +224,5 @@ def _is_round(corners: np.ndarray, outside: np.ndarray, axis: int) -> bool:
     is_even = np.linalg.norm(area @ normal) < ALL_WAYS * area.sum()
     aside = np.delete(corners[own].mean(axis=1), axis, axis=1) - middle
     is_outer = float(area @ (normal * aside).sum(axis=1)) > 0.0
-    is_long = float(np.ptp(corners[own][..., axis])) >= DEEP
-    return bool(off < OFF_ROUND * radius and is_even and is_outer and is_long)
+    is_long = float(area.sum()) >= 2.0 * math.pi * radius * DEEP * SLOTTED
+    return radius if off < OFF_ROUND * radius and is_even and is_outer and is_long else 0.0

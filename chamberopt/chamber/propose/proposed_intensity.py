@@ -358,7 +358,8 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
             )
         elif predicted is not None and not usual.low <= predicted.value <= usual.high:
             beside += ", though nothing but strips tells so small a difference"
-    return replace(made, reasons={**made.reasons, INTENSITY: f"{expected}; {beside}"})
+    reasons = {**made.reasons, INTENSITY: f"{expected}; {beside}"}
+    return replace(made, reasons=reasons, expected=predicted, usual=usual)
 
 
 def with_thin_places(made: Proposal) -> Proposal:
@@ -416,7 +417,9 @@ def with_prediction(
     ends = {"intensity_mmA": [wanted.low, wanted.high]}
     tables = {**made.tables, "process": {**made.tables["process"], **ends}}
     design = made.design.changed({"process.intensity_mmA": (wanted.low, wanted.high)})
-    return replace(made, tables=tables, reasons=reasons, design=design)
+    return replace(
+        made, tables=tables, reasons=reasons, design=design, expected=predicted, usual=wanted
+    )
 
 
 def _told(
@@ -435,7 +438,8 @@ def _told(
     key = amplitudes_of(made.sonotrode)[0]
     off, more = wanted.off(predicted.value), ""
     if off:
-        more = f"; NO BALLS THAT SERVE THE TARGET GIVE THIS INTENSITY: {_needed(made, off)}"
+        aim = f"{wanted.low:g}-{wanted.high:g}A"
+        more = f"; NO BALLS THAT SERVE THE TARGET GIVE {aim}: {_needed(made, off)}"
     reasons = dict(made.reasons)
     ball = "the nearest to the intensity" if off else "chosen for the intensity"
     reasons[f"sonotrode.{key}"] += f", {ball}"

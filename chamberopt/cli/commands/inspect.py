@@ -61,8 +61,9 @@ def inspect(
         Write an HTML page that shows the parts in a browser.
     """
     from chamberopt.common.progress import step
+    from chamberopt.documents.coverage import summary
     from chamberopt.pictures.subprocess_drawing import picture_path, require_opengl
-    from chamberopt.results.load import load_result, summary
+    from chamberopt.results.load import load_result
     from chamberopt.viewer.opened_result import result_info
     from chamberopt.viewer.view_state import ViewState, parse_clip, parse_view
     from chamberopt.viewer.window import inspect as open_window

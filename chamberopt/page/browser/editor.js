@@ -133,10 +133,12 @@ function fillSettle() {
     const words = isMeant ? [`: ${one.meets.join(", ")} ${one.meets.length > 1 ? "are" : "is"} in the target now, so that this is settled.`] : onPage(one.words);
     return element("li", {}, element("span", {}, element("b", { textContent: one.mark }), ...words), ...takes, done);
   });
-  const list = element("ol", {}, ...rows), head = element("h2", { textContent: "To be settled before it is built" });
+  const list = element("ol", {}, ...rows), fold = find("settle");
   const isOld = state.file.is_proposed && Object.keys(state.changes).some((name) => state.file.of_matters.includes(name.split(".")[0]));
   const note = isOld ? [element("p", { className: "warning", textContent: "Told of what was proposed, and you changed some of it: settle those that still hold." })] : [];
-  find("settle").replaceChildren(...rows.length ? [head, ...note, list] : []);
+  fold.hidden = !rows.length;
+  fold.firstElementChild.textContent = `${rows.length} to be settled before it is built`;
+  fold.lastElementChild.replaceChildren(...note, list);
 }
 
 function sayOf({ facts, unpeened, warnings, notes }) {

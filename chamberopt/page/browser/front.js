@@ -277,10 +277,11 @@ async function follow(begun) {
 find("propose").addEventListener("click", () => attempt(() => propose(ticked().filter((one) => one.checked).map((one) => one.value))));
 find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
 attempt(async () => {
-  const now = await ask("/status"), { part, unit, target = [] } = now.asked ?? {}; // of before a reload, or before a design was opened
+  const now = await ask("/status"), { part, unit, target = [], ...wishes } = now.asked ?? {}; // of before a reload, or before a design was opened
   const chosen = await show(part);
   await attempt(() => look(chosen, unit));
   proposed = target;
+  for (const id of WISHES) if (wishes[id]) find(id).value = wishes[id];
   for (const one of ticked()) one.checked = target.includes(one.value);
   document.body.dataset.ready = "yes";
   if (now.asked) await follow(now);

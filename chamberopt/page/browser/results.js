@@ -32,21 +32,24 @@ async function refresh(tick = ticked) {
 }
 
 function maker(paper, folder, file, name) {
-  const made = button(`make the ${name}`, (event) => make(event.target, paper, folder, file, name));
-  made.dataset.make = name;
+  const made = button(`make the ${name}`, () => make(paper, folder, file, name));
+  made.dataset.make = `${paper} ${folder}`;
   return made;
 }
 
 // One report or sheet is made at a time, beside a command that runs.
 const EVERY = 500; // ms between looks at it
-let making = false;
-function allow() { for (const one of list.querySelectorAll("[data-make]")) one.disabled = making; }
+let making = ""; // paper and folder
+function allow() {
+  for (const one of list.querySelectorAll("[data-make]")) {
+    const isIt = one.dataset.make === making;
+    Object.assign(one, { disabled: Boolean(making), className: isIt ? "at-work" : "", textContent: one.textContent.replace(/^mak(e|ing)/, isIt ? "making" : "make") });
+  }
+}
 
-async function make(pressed, paper, folder, file, name) {
-  const before = pressed.textContent;
-  making = true;
+async function make(paper, folder, file, name) {
+  making = `${paper} ${folder}`;
   allow();
-  Object.assign(pressed, { className: "at-work", textContent: `making the ${name} …` });
   await attempt(async () => {
     let now = await ask("/make", { paper, of: folder });
     while (now.exit === null) {
@@ -54,13 +57,12 @@ async function make(pressed, paper, folder, file, name) {
       now = await ask("/made", {});
     }
     if (now.exit !== 0) throw Object.assign(new Error(), { words: asLines(now.fault) });
-    making = false;
+    making = "";
     await refresh();
     say([`The ${name} of ${folder} is made: `, link(folder, file, "open it")], true);
   });
-  making = false;
+  making = "";
   allow();
-  Object.assign(pressed, { className: "", textContent: before }); // where it could not be made
 }
 
 find("show-results").addEventListener("click", () => attempt(() => show()));

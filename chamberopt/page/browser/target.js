@@ -102,7 +102,7 @@ function light(event) {
   lit = face;
   const own = [];
   if (face !== null) of.forEach((one, k) => { if (one === face) own.push(k); });
-  view.highlight("part", own.length ? own : null, fillTarget.part.pointed);
+  view.highlight("part", own.length ? own : null, fillTarget.part.pointed, false);
 }
 view.renderer.domElement.addEventListener("pointermove", light);
 view.renderer.domElement.addEventListener("pointerleave", () => light(null));

@@ -6,14 +6,13 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.key_words import title_with_unit
 from chamberopt.common.number_text import estimate_text, plain
-from chamberopt.coverage.metrics import highest_objective
 from chamberopt.pictures.charts.colours import BLUE, GREEN, GREY, ORANGE
 from chamberopt.pictures.charts.figure_style import (
     SMALL,
@@ -22,7 +21,6 @@ from chamberopt.pictures.charts.figure_style import (
     literal,
     name_choices,
     new_figure,
-    readable,
     save_picture,
     style_axes,
     value_range,
@@ -40,6 +38,23 @@ if TYPE_CHECKING:
 MAX_COLUMNS = 4  # panels side by side
 WIDE = (11.0, 3.8)  # inch
 Y_LABEL = 40  # letters of a line that fit beside a chart
+
+
+class ObjectiveAxis(NamedTuple):
+    """How charts name and scale an objective: a time to be short is a time, and not a score."""
+
+    label: str  # with its unit
+    factor: float = 1.0  # shown number over the objective; negative if the smaller is the better
+    most: float = math.inf  # largest number that can be shown
+
+    def scale(self, estimate: Estimate) -> Estimate:
+        """Return an objective in the unit of the axis."""
+        half_width = abs(self.factor) * estimate.half_width
+        return Estimate(self.factor * estimate.value, half_width, in_words=estimate.in_words)
+
+    def title(self, estimate: Estimate, sign: bool = False) -> str:
+        """Return an objective as text, with its interval."""
+        return estimate_text(estimate, self.factor, sign=sign)
 
 
 @dataclass(frozen=True)
@@ -61,26 +76,33 @@ class EvaluatedCandidate:
     parameters: Mapping[str, float | str] = field(default_factory=dict)
 
 
-def convergence_picture(path: Path, result: StudyResult) -> None:
+def convergence_picture(path: Path, result: StudyResult, objective: ObjectiveAxis) -> None:
     """Write charts of the objective by order of evaluation and over each parameter, as .png."""
     candidates = [
-        EvaluatedCandidate(t.number + 1, t.stage, t.objective, t.feasible, t.parameters)
+        EvaluatedCandidate(
+            t.number + 1,
+            t.stage,
+            objective.scale(t.objective) if t.objective else None,
+            t.feasible,
+            t.parameters,
+        )
         for t in result.trials
     ]
-    y_label = readable(result.study.objective.goals[0])
     names = list(result.study.vary)
     columns = min(len(names), MAX_COLUMNS)
     rows = -(-len(names) // columns)
     figure = new_figure(11.0, 4.2 + 3.0 * rows)
     grid = figure.add_gridspec(rows + 1, columns, height_ratios=[1.35, *[1.0] * rows])
     axes = figure.add_subplot(grid[0, :])
-    most = highest_objective(result.study.objective.goals[0], 1.0)
-    draw_convergence(axes, candidates, y_label, most=most)
+    smaller = objective.factor < 0.0
+    draw_convergence(axes, candidates, objective.label, smaller, objective.most)
     start, best = (one.evaluation.objective for one in (result.start, result.best))
-    axes.axhline(start.value, color=ORANGE, lw=1.2, ls="--", label="start, as confirmed")
+    axes.axhline(
+        objective.factor * start.value, color=ORANGE, lw=1.2, ls="--", label="start, as confirmed"
+    )
     axes.set_title(
-        f"best {estimate_text(best)}, start {estimate_text(start)}: "
-        f"gain {estimate_text(result.gain, sign=True)}",
+        f"best {objective.title(best)}, start {objective.title(start)}: "
+        f"change {objective.title(result.gain, sign=True)}",
         loc="left",
         fontsize=TITLE,
     )
@@ -91,10 +113,10 @@ def convergence_picture(path: Path, result: StudyResult) -> None:
     first: Axes | None = None
     for i, name in enumerate(names):
         axes = figure.add_subplot(grid[1 + i // columns, i % columns], sharey=first)
-        _draw_parameter(axes, result, candidates, name)
-        keep_below(axes, most)
+        _draw_parameter(axes, result, candidates, name, objective)
+        keep_below(axes, objective.most)
         if i % columns == 0:
-            axes.set_ylabel(y_label)
+            axes.set_ylabel(fill(objective.label, Y_LABEL))
         else:
             axes.tick_params(labelleft=False)
         first = first or axes
@@ -136,9 +158,14 @@ def draw_convergence(
     ):
         if group:
             x, y, half_width = zip(*map(_point, group), strict=True)
-            axes.errorbar(x, y, yerr=half_width, fmt=marker, ms=5, lw=1, color=colour, label=label,
+            bars = [one if math.isfinite(one) else 0.0 for one in half_width]
+            axes.errorbar(x, y, yerr=bars, fmt=marker, ms=5, lw=1, color=colour, label=label,
                           gid=label)  # fmt: skip
             tooltips[label] = [_tooltip(one) for one in group]
+    # A value without an interval is the least sure, and must not look like the surest.
+    if rough := [one for one in (*evaluated, *confirmed) if not math.isfinite(_point(one)[2])]:
+        x, y, _ = zip(*map(_point, rough), strict=True)
+        axes.plot(x, y, "o", mfc="none", mec=GREY, ms=11, label="ringed: not resolved")
     if failed:
         axes.plot(failed, np.full(len(failed), 0.02), "|", color=GREY, clip_on=False,
                   label="not simulated", transform=axes.get_xaxis_transform())  # fmt: skip
@@ -182,7 +209,11 @@ def _tooltip(candidate: EvaluatedCandidate) -> str:
 
 
 def _draw_parameter(
-    axes: Axes, result: StudyResult, candidates: Sequence[EvaluatedCandidate], name: str
+    axes: Axes,
+    result: StudyResult,
+    candidates: Sequence[EvaluatedCandidate],
+    name: str,
+    objective: ObjectiveAxis,
 ) -> None:
     """Draw the objective of each candidate over one parameter, later candidates darker.
 
@@ -208,7 +239,7 @@ def _draw_parameter(
     ):
         if not is_there(confirmed.parameters[name], varied.texts):
             continue
-        value = confirmed.evaluation.objective.value
+        value = objective.factor * confirmed.evaluation.objective.value
         place = varied.place(confirmed.parameters[name])
         axes.plot(place, value, marker, color=colour, label=label, ms=size, mec="white")
     low, high = varied.bounds
@@ -228,15 +259,17 @@ def is_there(value: float | str, texts: Sequence[str]) -> bool:
     return not isinstance(value, str) or value in texts
 
 
-def slices_picture(path: Path, result: StudyResult, sensitivity: Sensitivity) -> None:
+def slices_picture(
+    path: Path, result: StudyResult, sensitivity: Sensitivity, objective: ObjectiveAxis
+) -> None:
     """Write charts of the objective over each parameter, by the study's model, as .png."""
     figure = slices_figure(
-        sensitivity.slices,
+        [one.scaled(objective.factor) for one in sensitivity.slices],
         result.start.parameters,
         result.best.parameters,
-        f"loses no more than {sensitivity.noise:.2g}",
-        readable(result.study.objective.goals[0]),
-        highest_objective(result.study.objective.goals[0], 1.0),
+        f"loses no more than {abs(objective.factor) * sensitivity.noise:.2g}",
+        fill(objective.label, Y_LABEL),
+        objective.most,
     )
     save_picture(figure, path)
 
@@ -306,7 +339,7 @@ def _place(of: Slice, value: float | str) -> float:
     return float(of.texts.index(value) if isinstance(value, str) else value)
 
 
-def pareto_picture(path: Path, result: StudyResult) -> None:
+def pareto_picture(path: Path, result: StudyResult, objectives: Sequence[ObjectiveAxis]) -> None:
     """Write a chart of one objective against the other for every candidate, as .png.
 
     It marks the Pareto front: the confirmed candidates that no other candidate beats in one
@@ -325,7 +358,11 @@ def pareto_picture(path: Path, result: StudyResult) -> None:
     )
     for stage, on_front, colour, marker, label in groups:
         shown = sorted(
-            (one.goals for one in candidates if (one.stage, one.on_front) == (stage, on_front)),
+            (
+                [axis.scale(goal) for axis, goal in zip(objectives, one.goals, strict=True)]
+                for one in candidates
+                if (one.stage, one.on_front) == (stage, on_front)
+            ),
             key=lambda goals: goals[0].value,
         )
         x, y = ([goals[k].value for goals in shown] for k in (0, 1))
@@ -338,16 +375,25 @@ def pareto_picture(path: Path, result: StudyResult) -> None:
     # Only confirmed candidates have intervals.
     x_goals, y_goals = (
         [
-            one.goals[k] if one.stage == "confirm" else Estimate(one.goals[k].value, 0.0)
+            axis.scale(
+                one.goals[k] if one.stage == "confirm" else Estimate(one.goals[k].value, 0.0)
+            )
             for one in candidates
         ]
-        for k in (0, 1)
+        for k, axis in enumerate(objectives)
     )
-    x_most, y_most = (highest_objective(one, 1.0) for one in result.study.objective.goals)
-    axes.set_xlim(*value_range(x_goals, x_most))
-    axes.set_ylim(*value_range(y_goals, y_most))
-    x_name, y_name = map(readable, result.study.objective.goals)
-    style_axes(axes, f"{x_name}, better to the right", f"{y_name}, better upwards")
+    x_axis, y_axis = objectives
+    axes.set_xlim(*value_range(x_goals, x_axis.most))
+    axes.set_ylim(*value_range(y_goals, y_axis.most))
+    right, up = (
+        "the left" if x_axis.factor < 0.0 else "the right",
+        "downwards" if y_axis.factor < 0.0 else "upwards",
+    )
+    style_axes(
+        axes,
+        f"{x_axis.label}, better to the {right}",
+        fill(f"{y_axis.label}, better {up}", Y_LABEL),
+    )
     axes.legend(fontsize=SMALL, frameon=False)
     save_picture(figure, path)
 

@@ -94,3 +94,13 @@ def test_a_histogram_holds_all_of_the_area() -> None:
     draw_histogram(axes, HistogramData(coverage.BIN_EDGES, [shares], [""], [{}], "", ""))
     (steps,) = axes.patches
     assert sum(steps.get_data().values) == pytest.approx(100.0)
+
+
+def test_what_is_not_resolved_is_ringed_and_has_no_bar() -> None:
+    rows = [evaluation(1, 900.0), EvaluatedCandidate(2, "search", Estimate(500.0, np.inf), True)]
+    axes = new_figure(4.0, 3.0).subplots()
+    draw_convergence(axes, rows, "time [s]", True)
+    (ring,) = (line for line in axes.lines if "not resolved" in str(line.get_label()))
+    assert (ring.get_xdata().tolist(), ring.get_ydata().tolist()) == ([2], [500.0])
+    low, high = axes.get_ylim()
+    assert np.isfinite([low, high]).all()

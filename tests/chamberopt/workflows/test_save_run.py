@@ -11,10 +11,11 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.load import load_design
+from chamberopt.documents.coverage import summary
 from chamberopt.documents.report import report
 from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.compare.comparison import compare
-from chamberopt.results.load import load_result, summary
+from chamberopt.results.load import load_result
 from chamberopt.search.candidate import evaluation_cost
 from chamberopt.search.study import Study
 from chamberopt.viewer.opened_result import OpenedResult, result_info

@@ -80,7 +80,7 @@ export class Plot {
     }
   }
 
-  // A candidate at [x, y] with the half-width of y; without y it lies on the floor of the plot, as a cross.
+  // A candidate at [x, y] with the half-width of y; hollow where that is null, as y is not resolved; without y it lies on the floor of the plot, as a cross.
   candidate(one, x, interval, { colour, cross = false, ring = "" }) {
     const at = this.x(x), y = interval ? this.y(interval[0]) : this.floor;
     if (at === null || y === null) return;
@@ -88,7 +88,7 @@ export class Plot {
     const mark = svg("g", { class: "candidate", "data-number": one.number, stroke: colour, fill: colour });
     if (half) mark.append(svg("line", { x1: at, x2: at, y1: y - half, y2: y + half }));
     if (cross) mark.append(svg("path", { d: `M${at - 3.5} ${y - 3.5}l7 7m0 -7l-7 7`, "stroke-width": 1.4 }));
-    else mark.append(svg("circle", { cx: at, cy: y, r: 4 }));
+    else mark.append(svg("circle", { cx: at, cy: y, r: 4, ...(interval?.[1] === null ? { fill: "white", "stroke-width": 1.5 } : {}) }));
     if (ring) mark.append(svg("circle", { cx: at, cy: y, r: 7, fill: "none", stroke: ring, "stroke-width": 2 }));
     mark.append(svg("circle", { cx: at, cy: y, r: 9, class: "target" }), svg("title", {}, one.tip));
     this.inside.append(mark);
@@ -96,12 +96,12 @@ export class Plot {
 }
 
 // Parallel coordinates: an axis for each number, and a line for each candidate.
-export function parallel({ width, height, axes, candidates, colourOf, chosen }) {
+export function parallel({ width, height, axes, candidates, valueOf, colourOf, chosen }) {
   const top = 34, bottom = height - 22, across = (k) => 20 + k * (width - 60) / Math.max(1, axes.length - 1);
   const drawing = svg("svg", { width, height, role: "img" }, svg("title", {}, "all numbers of each candidate"));
   const scales = axes.map((one) => scaleOf(one, bottom, top));
   for (const one of candidates) {
-    const places = axes.map(({ name }, k) => [across(k), scales[k](one.values[name])]).filter(([, y]) => y !== null);
+    const places = axes.map(({ name }, k) => [across(k), scales[k](valueOf(one, name))]).filter(([, y]) => y !== null);
     const path = { points: places.map((place) => place.join(",")).join(" "), fill: "none" };
     drawing.append(svg("g", { class: "candidate", "data-number": one.number, stroke: colourOf(one) },
       svg("polyline", { ...path, "stroke-width": one.number === chosen ? 4 : 1.3, ...(one.objective ? {} : { "stroke-dasharray": "3 3" }) }),
@@ -111,7 +111,7 @@ export function parallel({ width, height, axes, candidates, colourOf, chosen }) 
     drawing.append(svg("line", { x1: across(k), x2: across(k), y1: top, y2: bottom, class: "axis" }),
       svg("text", { x: across(k), y: k % 2 ? 25 : 11, "text-anchor": k === 0 ? "start" : k === axes.length - 1 ? "end" : "middle", class: "name" }, one.label));
     for (const at of one.texts?.length ? one.texts : [one.low, one.high])
-      drawing.append(svg("text", { x: across(k) + 4, y: scales[k](at) + (at === one.low ? 12 : -3) }, String(at)));
+      drawing.append(svg("text", { x: across(k) + 4, y: scales[k](at) + (at === one.low ? 12 : -3) }, String(Number.isFinite(at) ? Number(at.toPrecision(4)) : at)));
   });
   return drawing;
 }

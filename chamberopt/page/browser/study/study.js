@@ -130,7 +130,7 @@ function inOrder() {
   const kinds = Object.keys(WORDS).filter((kind) => candidates.some((one) => one.kind === kind));
   const best = candidates.filter((one) => one.is_best).map((one) => [BEST, false, `ring: ${one.standing}, candidate ${one.name}`]);
   const marks = [...best, [colours.start, false, "the start"], ...kinds.map((kind) => [colours[kind], isCross(kind), WORDS[kind]])];
-  return [figure("Every candidate in its order, with its 95 % interval; the line is the best so far, as searched. What is confirmed stands beside its candidate.", plot.drawing,
+  return [figure("Every candidate in its order, with its 95 % interval, hollow where it is not resolved; the line is the best so far, as searched. What is confirmed stands beside its candidate.", plot.drawing,
     element("ul", { className: "marks" }, ...marks.map(([colour, cross, text]) => {
       const sign = element("b", { textContent: cross ? "✕" : colour === BEST ? "○" : "●" });
       sign.style.color = colour;
@@ -167,7 +167,9 @@ function overTwo(axes) {
 }
 
 function overAll() {
-  const lines = parallel({ width: wide(), height: 260, axes: data.axes, candidates: searched(), colourOf, chosen });
+  const [low, high] = ends(), isKnown = Number.isFinite(low), objective = { name: "objective", label: data.objectives[0], low, high };
+  const valueOf = (one, name) => name !== "objective" ? one.values[name] : one.objective ? one.objective[0] : "none";
+  const lines = parallel({ width: wide(), height: 260, axes: [...isKnown ? [objective] : [], ...data.axes], candidates: searched(), valueOf, colourOf, chosen });
   return [title("All numbers"), figure("A line for each candidate, coloured by the objective; dashed: not simulated.", lines, colourBar())];
 }
 

@@ -207,8 +207,8 @@ class View3D {
     marked.matrixWorldNeedsUpdate = true;
   }
 
-  // Mark triangles of a surface, also where they are hidden; null for none.
-  highlight(name, triangles, colour) {
+  // Mark triangles of a surface, also where they are hidden, or only where they are seen; null for none.
+  highlight(name, triangles, colour, isThrough = true) {
     this.remove("highlight");
     const mesh = this.get(name);
     if (!mesh || !triangles) { delete this.element.dataset.highlight; return; }
@@ -217,7 +217,7 @@ class View3D {
     triangles.forEach((k, i) => own.set(index.subarray(3 * k, 3 * k + 3), 3 * i));
     const marked = this.surface("highlight", { points, triangles: own, opacity: MARKED });
     marked.material.color.set(colour);
-    Object.assign(marked.material, { depthTest: false });
+    Object.assign(marked.material, isThrough ? { depthTest: false } : { polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -4 });
     marked.renderOrder = 1;
     marked.userData.of = name;
     this.#lay(name);

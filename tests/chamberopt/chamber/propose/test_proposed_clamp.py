@@ -11,7 +11,8 @@ from chamberopt.chamber.propose import proposed_clamp
 from chamberopt.chamber.propose.proposed_clamp import (
     _clamp,
     _is_cut_all_round,
-    _is_round,
+    _round_end,
+    _round_radius,
     bore_clearance_mm,
 )
 from chamberopt.design.fixture import tight_gap_mm
@@ -53,9 +54,26 @@ def test_a_journal_is_round_and_splines_and_bores_are_not(axis: int) -> None:
         (~level & (radius > 15.0) & (tube.triangles_center[:, 0] > 0.0), False),  # half of it
     ]:
         outside = np.where(marked, area, 0.0)
-        assert _is_round(1e-3 * turned, outside, axis) == is_round
-    low = np.where(np.arange(3) == axis, 0.4, 1.0) * 1e-3  # 6 mm long
-    assert not _is_round(low * turned, np.where(~level, area, 0.0), axis)
+        radius_mm = 1e3 * _round_radius(1e-3 * turned, outside, axis)
+        assert radius_mm == pytest.approx(20.0 if is_round else 0.0, rel=1e-3)
+    shank = ~level & (radius > 15.0)
+    low = np.where(np.arange(3) == axis, 0.3, 1.0) * 1e-3  # 4.5 mm long
+    assert not _round_radius(low * turned, np.where(shank, 0.3 * area, 0.0), axis)
+
+
+def test_a_shank_with_a_key_and_an_end_face_is_held_by_its_diameter() -> None:
+    """A shank of 20 x 30 mm along z with a key of 6 x 6 x 15 mm on it."""
+    shank = trimesh.creation.cylinder(10.0, 30.0, sections=64)
+    key = trimesh.creation.box((6.0, 6.0, 15.0))
+    key.apply_translation((9.0, 0.0, 0.0))
+    body = trimesh.boolean.union([shank, key], engine="manifold")
+    outside = np.where(body.triangles_center[:, 2] > -14.0, 1e-6 * body.area_faces, 0.0)
+    vertices, triangles = 1e-3 * body.vertices, np.asarray(body.faces)
+    assert 1e3 * _round_end(vertices, triangles, outside, [2]) == pytest.approx(10.0, rel=1e-3)
+    assert _round_end(vertices, triangles, outside, [0]) == 0.0
+    square = trimesh.creation.box((20.0, 20.0, 30.0))
+    sides = 1e-6 * square.area_faces
+    assert _round_end(1e-3 * square.vertices, np.asarray(square.faces), sides, [2]) == 0.0
 
 
 @pytest.mark.parametrize(
