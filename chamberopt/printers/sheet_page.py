@@ -25,10 +25,10 @@ from chamberopt.common.files import claim_file, private_folder, write_bytes
 from chamberopt.common.number_text import held_together
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.sheet import (
-    OUTLINES,
     AsBuilt,
     chamber_limits,
     drawn_openings,
+    outlines_in_words,
     process_sheet,
     slit_limits,
 )
@@ -68,6 +68,7 @@ SIZES = (8.0, 7.5, 7.0, 6.5, 6.0, 5.5, 5.0)  # pt of the text; the largest size 
 LEAST_ALONE = 6.5  # pt: with smaller letters than these on one page there are further pages
 # Height of the drawing with its caption [mm]: the least for each pt of the text, and the most.
 DRAWING_PER_PT, MOST_DRAWING = 13.0, 125.0
+LEAST_OPENINGS = 110.0  # mm: with less room below the coverage they have a page of their own
 LEAST_SCALE = 0.5  # of the first page's drawing, below which there is a larger one on its own page
 CAPTION, ROW = 7.0, 8.0  # mm, of the caption, and of a row of the title block
 FIELDS = 6  # in a row of the title block
@@ -289,7 +290,13 @@ def write_sheet(
         sheet = process_sheet(loaded, built, revision)
         limits, face = slit_limits(loaded) | chamber_limits(loaded), design.sonotrode.face
         pages = draw_sheet(
-            sheet, chamber, limits, face, drawn_openings(built), coverage_map(loaded.folder)
+            sheet,
+            chamber,
+            limits,
+            face,
+            drawn_openings(built),
+            coverage_map(loaded.folder),
+            1e3 * clear,
         )
         _save(path, pages, sheet.name)
     return path, sheet
@@ -316,6 +323,7 @@ def draw_sheet(
     face: Face | None = None,
     openings: Sequence[tuple[str, Opening]] = (),
     coverage: np.ndarray | None = None,
+    clearance_mm: float = 0.0,
 ) -> list[Figure]:
     """Return a process sheet as figures of its pages.
 
@@ -330,6 +338,7 @@ def draw_sheet(
         face: on which the chamber stands, if it is known.
         openings: those that are cut along the part's section, each with its words.
         coverage: picture of the coverage, red, green and blue of each pixel.
+        clearance_mm: round the part in its openings.
     """
     ignore_settings_here()
     first, further, block = sheet.sections
@@ -359,14 +368,19 @@ def draw_sheet(
         _drawing(larger, chamber, y, tall, limits, face)
         pages.append(larger)
     pages += _further_steps(chamber, sheet.name, limits, face)
+    y = 0.0
     if coverage is not None:
-        pages.append(_coverage_page(coverage, sheet.name))
-    if openings:
-        last, y = _further_page("Openings", sheet.name)
-        scale = draw_openings(last, openings, MARGIN, y - CAPTION, (INNER, y - FOOT - CAPTION))
-        text = f"{OUTLINES} Scale {scale}, dimensions in mm."
-        Writer(last, 6.0).write(text, MARGIN, y, INNER, colour=DARK_GREY)
+        last, y = _coverage_page(coverage, sheet.name)
         pages.append(last)
+    if openings:
+        if y - FOOT < LEAST_OPENINGS:
+            last, y = _further_page("Openings", sheet.name)
+            pages.append(last)
+        else:
+            y = Writer(last, 12.0).write("Openings", MARGIN, y - 6.0, INNER, bold=True) - 3.0
+        scale = draw_openings(last, openings, MARGIN, y - CAPTION, (INNER, y - FOOT - CAPTION))
+        text = f"{outlines_in_words(clearance_mm)} Scale {scale}, dimensions in mm."
+        Writer(last, 6.0).write(text, MARGIN, y, INNER, colour=DARK_GREY)
     for number, one in enumerate(pages, 1):
         (fields,) = block.content
         assert isinstance(fields, Table)
@@ -488,8 +502,11 @@ def _further_steps(
             yield axes
 
 
-def _coverage_page(picture: np.ndarray, name: str) -> Axes:
-    """Return a page with the picture of the coverage, as wide as the page if it is low enough."""
+def _coverage_page(picture: np.ndarray, name: str) -> tuple[Axes, float]:
+    """Return a page with the picture of the coverage, and the height of its bottom [mm].
+
+    It is as wide as the page if it is low enough.
+    """
     axes, y = _further_page("Coverage by place", name)
     y = Writer(axes, 7.0).write(COVERAGE, MARGIN, y, INNER) - 3.0
     rows, columns = picture.shape[:2]
@@ -498,7 +515,7 @@ def _coverage_page(picture: np.ndarray, name: str) -> Axes:
         picture, extent=(MARGIN, MARGIN + size[0], y - size[1], y), interpolation="antialiased"
     )
     axes.set(xlim=(0.0, WIDTH), ylim=(0.0, HEIGHT), aspect="auto")
-    return axes
+    return axes, float(y - size[1])
 
 
 def _further_page(title: str, name: str) -> tuple[Axes, float]:

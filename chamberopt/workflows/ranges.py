@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from chamberopt.simulation.evaluation import Evaluation
     from chamberopt.workflows.simulate import Teller
 
-STEP = "replicas at the ends of what is not calibrated"
+ENDS = "replicas at the ends of what is not calibrated"
 
 
 class EndError(Exception):
@@ -36,7 +36,12 @@ class EndError(Exception):
 
 
 def simulate_ranges(
-    design: Design, chamber: Chamber, found: Evaluation, executor: Executor, teller: Teller
+    design: Design,
+    chamber: Chamber,
+    found: Evaluation,
+    executor: Executor,
+    teller: Teller,
+    step: str = ENDS,
 ) -> RangeResult | None:
     """Return the ranges of a design's figures; None if all of its numbers are known or calibrated.
 
@@ -44,13 +49,14 @@ def simulate_ranges(
 
     Args:
         found: evaluation of the design.
+        step: what the step is called.
     """
     groups = unknowns(design)
     if not groups:
         return None
     count = replicas_at_ends(found.replicas, len(groups))
     teller.tell(cost_text([one.name for one in groups], count, found.replicas))
-    with teller.step(STEP, 2 * len(groups) * count) as progress:
+    with teller.step(step, 2 * len(groups) * count) as progress:
         runs = _simulated(design, chamber, found, executor, progress, count)
         return find_ranges(runs)
 
@@ -73,7 +79,7 @@ def study_ranges(result: StudyResult, executor: Executor, teller: Teller) -> Stu
     teller.tell(cost_text([one.name for one in groups[0]], count, least, len(compared)))
     ends: list[EndRuns] = []
     total, ended = 2 * count * sum(map(len, groups)), 0
-    with teller.step(STEP, total) as progress:
+    with teller.step(ENDS, total) as progress:
         for one, unknown in zip(compared, groups, strict=True):
             chamber = result.chamber_of(one)
 

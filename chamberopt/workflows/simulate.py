@@ -15,7 +15,7 @@ from chamberopt.chamber.analytic import analytic_cavity
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.progress import step, untold
 from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
-from chamberopt.design.ranges import variants
+from chamberopt.design.ranges import unknowns, variants
 from chamberopt.peening.calibration_errors import evaluate_calibrated
 from chamberopt.peening.range_result import Spreads
 from chamberopt.peening.tolerances import simulate_tolerances, with_usual_tolerances
@@ -23,7 +23,7 @@ from chamberopt.simulation.effect_pilot import with_effects_resolved
 from chamberopt.simulation.effort import Effort
 from chamberopt.simulation.evaluate import ReplicaPlan
 from chamberopt.workflows.compile import compile_for
-from chamberopt.workflows.ranges import EndError, simulate_ranges
+from chamberopt.workflows.ranges import ENDS, EndError, simulate_ranges
 from chamberopt.workflows.save_run import save_simulation
 
 if TYPE_CHECKING:
@@ -102,6 +102,9 @@ def teller_of(progress: Progress | bool) -> Teller:
     return Teller(progress or None)
 
 
+SAVING = "writing and drawing"
+
+
 @dataclass(frozen=True)
 class SimulationSettings:
     """How a design is simulated.
@@ -174,7 +177,11 @@ def simulate_design(
         variants(design)  # before the work begins
     teller.compile(design, chamber, cavity)
     found, ranges = None, None
-    with teller.step(settings.step, Effort.of(design.process.accuracy).most) as progress:
+    # What follows the replicas takes as long again, which a user who waits is to know.
+    first, then, last = steps = settings.step, ENDS, SAVING
+    if settings.ranges and unknowns(design):
+        first, then, last = (f"step {k} of 3: {one}" for k, one in enumerate(steps, 1))
+    with teller.step(first, Effort.of(design.process.accuracy).most) as progress:
         what = design, chamber, executor, progress
         if settings.tolerances:
             evaluation, found = simulate_tolerances(*what, settings.analytic)
@@ -182,11 +189,11 @@ def simulate_design(
             evaluation = evaluate_calibrated(*what, settings.plan, cavity)
     if settings.ranges:
         try:
-            ranges = simulate_ranges(design, chamber, evaluation, executor, teller)
+            ranges = simulate_ranges(design, chamber, evaluation, executor, teller, then)
         except EndError as error:
             evaluation = replace(evaluation, notes=(str(error), *evaluation.notes))
     spreads = Spreads(found, ranges)
-    with teller.step("writing and drawing"):
+    with teller.step(last):
         saved = save_simulation(folder, design, chamber, evaluation, advice, warnings, spreads)
     return Simulated(design, chamber, evaluation, spreads, advice, *saved)
 

@@ -9,13 +9,12 @@ from chamberopt.documents.sheet.document import (
     title_block,
 )
 from chamberopt.documents.sheet.expected import calibrated_to, first_checks
-from chamberopt.documents.sheet.openings import OUTLINES, drawn_openings
+from chamberopt.documents.sheet.openings import drawn_openings, outlines_in_words
 from chamberopt.documents.sheet.rows import AsBuilt, amplitude_text, key_row
 from chamberopt.documents.sheet.settings import chamber_limits, slit_limits
 from chamberopt.documents.sheet.warned import alarms, cautions
 
 __all__ = [
-    "OUTLINES",
     "REQUALIFY",
     "AsBuilt",
     "alarms",
@@ -28,6 +27,7 @@ __all__ = [
     "first_checks",
     "key_row",
     "limit_tables",
+    "outlines_in_words",
     "process_sheet",
     "setting_tables",
     "slit_limits",

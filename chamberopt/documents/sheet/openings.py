@@ -26,10 +26,6 @@ MOUNTED: dict[Mounting, str] = {
     "wall goes over": "the wall goes over it from outside",
     "split": "split the wall there",
 }
-OUTLINES = (
-    "What the part fills of the wall, seen from outside, without clearance. Dashed: where it goes "
-    "on over an edge of the wall."
-)
 
 
 def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
@@ -125,6 +121,15 @@ def _wall_of(one: Opening) -> str:
     ways = zip("xy", (float(x / level) for x in one.way[:2]), strict=True)
     at = next((f" at {'+−'[x < 0.0]}{axis}" for axis, x in ways if abs(x) > SQUARE), "")
     return one.wall if one.wall == CEILING else f"{one.wall}{at}"
+
+
+def outlines_in_words(clearance_mm: float) -> str:
+    """Return what the outlines of openings show, with what is cut beyond them."""
+    wider = f": cut it {plain(clearance_mm)} mm wider all round" if clearance_mm else ""
+    return (
+        f"What the part fills of the wall, seen from outside, without clearance{wider}. Dashed: "
+        "where it goes on over an edge of the wall. Small: corners, from the lower left."
+    )
 
 
 def drawn_openings(built: AsBuilt) -> list[tuple[str, Opening]]:

@@ -12,7 +12,7 @@ from tests.chamberopt.page.conftest import Served
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self").exists(), reason="looks in /proc")
 TIME = re.compile("(?<=simulated_time_s = ).*")
-SIMULATING = '"replicas"', '"candidates and confirmations"', '"candidates"'  # steps of the commands
+SIMULATING = 'replicas"', '"candidates and confirmations"', '"candidates"'  # steps of the commands
 
 
 def processes_in(folder: Path) -> dict[int, str]:

@@ -305,6 +305,23 @@ def test_outlines_of_openings_are_drawn_with_two_dimensions() -> None:
         (x, y) = axes.patches[0].get_path().vertices.T
         found = 0.5 * abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
         assert found == pytest.approx(area, rel=1e-6)
+        places = {"3", "37", "15"} if tall == 18 else {"4", "20"}  # from the lower left
+        assert places <= {text.strip() for text, _ in boxes}
+
+
+def test_the_round_of_an_opening_with_a_keyway_has_its_diameter() -> None:
+    angle = np.radians(np.linspace(15.0, 345.0, 111))
+    arc = [(10.0 * np.cos(one), 10.0 * np.sin(one)) for one in angle]
+    key = [(14.0, arc[-1][1]), (14.0, arc[0][1])]
+    at = (0.0, 0.0, 0.1), 0.01, (0.0, 0.0, 1.0)
+    outline = sides(*arc, *key, arc[0]) - [2e-3, 0.0]
+    one = Opening("the ceiling", (0.024, 0.02), *at, "other", outline)
+    figure = Figure(figsize=(WIDTH / 25.4, HEIGHT / 25.4))
+    axes = figure.add_axes((0, 0, 1, 1), xlim=(0, WIDTH), ylim=(0, HEIGHT))
+    draw_openings(axes, [("a shank", one)], MARGIN, 200.0, (180.0, 180.0))
+    boxes = boxes_of(figure)
+    require_apart(boxes)
+    assert {"Ø 20", "24", "20", "19.7", "7.4", "12.6"} <= {text.strip() for text, _ in boxes}
 
 
 def test_what_the_best_costs_is_on_the_sheet(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
