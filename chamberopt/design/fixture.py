@@ -43,12 +43,12 @@ def slit_mm(ball_mm: float) -> float:
     return math.floor(100.0 * WIDEST_GAP * ball_mm + 1e-9) / 100.0
 
 
-# The keys that each kind of holder may have beside `axis`.
+# The keys that each kind of holder may have.
 HOLDER_KEYS = {
-    "rod": ("at", "diameter_mm"),
-    "collar": ("at", "diameter_mm", "grip_mm"),
-    "plate": ("at", "size_mm", "grip_mm", "thickness_mm", "diameter_mm"),
-    "arbor": ("at", "both_sides", "diameter_mm", "thickness_mm", "grip_mm"),
+    "rod": ("at", "axis", "diameter_mm"),
+    "collar": ("at", "axis", "diameter_mm", "grip_mm"),
+    "plate": ("at", "axis", "size_mm", "grip_mm", "thickness_mm", "diameter_mm"),
+    "arbor": ("at", "axis", "both_sides", "diameter_mm", "thickness_mm", "grip_mm"),
     "bore": ("clearance_mm",),
 }
 
@@ -108,7 +108,7 @@ class Holder(FileTable):
         allowed = HOLDER_KEYS[self.kind]
         for name, field in type(self).model_fields.items():
             is_given = getattr(self, name) != field.default
-            if is_given and name not in (*allowed, "kind", "axis"):
+            if is_given and name not in (*allowed, "kind"):
                 may = f'of kind "{self.kind}", which may have {" and ".join(allowed)}'
                 yield Problem(name, f"not {may}; leave it out")
         if self.size_mm is not None and not all(0.1 <= side <= 2000 for side in self.size_mm):

@@ -491,7 +491,7 @@ def _numbers(design: Design) -> Iterator[tuple[str, FieldInfo]]:
     """
     absent = [f"{table}." for table in ("holder", "mask") if getattr(design, table) is None]
     if design.holder is not None:  # keys of other kinds
-        own = ("kind", "axis", *HOLDER_KEYS[design.holder.kind])
+        own = ("kind", *HOLDER_KEYS[design.holder.kind])
         absent += [f"holder.{key}" for key in Holder.model_fields if key not in own]
     of_shell = ("thickness_mm", "margin_mm")
     of_mask = {"shell": ("axis",), "plugs": OF_MASK, "block": of_shell, NO_MASK: ()}

@@ -62,6 +62,8 @@ _TERMINAL = re.compile(
 )
 # Sizes of strips, as options of a command.
 _DISC, _STRIP = re.compile(r"--disc-mm ([\d.]+)"), re.compile(r"--size-mm ([\d.]+) ([\d.]+)")
+# Surfaces of a part, as options of a command.
+_TARGETS = re.compile(r'--target ("[^"]+"(?: --target "[^"]+")*)')
 # Terms that not every reader knows, and what they mean (docs/reference/glossary.md).
 TERMS = {
     "uniform coverage": "mean coverage of the target less its standard deviation: high where the "
@@ -98,10 +100,13 @@ def on_page(text: str, known: set[str] | None = None) -> Words:
 
     >>> on_page("raise chamber.height_mm")
     ['raise ', ('height of the chamber', 'chamber.height_mm')]
+    >>> on_page('all of them: --target "face 2" --target "face 3"')
+    ['all of them: "face 2" and "face 3"']
     """
     made: Words = []
     at, text = 0, _TERMINAL.sub("", _PLACE.sub("", text))
     text = _STRIP.sub(r"a strip of \1 x \2 mm", _DISC.sub(r"a disc of \1 mm", text))
+    text = _TARGETS.sub(lambda found: found[1].replace(" --target ", " and "), text)
     known = set() if known is None else known
     for match in sorted((*_KEY.finditer(text), *_TERM.finditer(text)), key=lambda one: one.start()):
         found = match[0]

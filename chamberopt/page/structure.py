@@ -243,7 +243,7 @@ def _with_kind(holder: Holder | None, changes: Mapping[str, Any], kind: str) -> 
     if kind == (NO_HOLDER if holder is None else holder.kind):
         return kept
     given = set() if holder is None or kind == NO_HOLDER else holder.model_fields_set
-    stay = {"kind", "axis", *({"at"} & {*HOLDER_KEYS.get(kind, ())})}
+    stay = {"kind", *({"at", "axis"} & {*HOLDER_KEYS.get(kind, ())})}
     return {**kept, KIND: kind, **{f"holder.{key}": None for key in given - stay}}
 
 

@@ -36,4 +36,4 @@ def format_box(sides: np.ndarray) -> str:
 
 def format_point(point: np.ndarray) -> str:
     """Return a position (3,) [m] as text: '(1, 2, 3) mm'."""
-    return "(" + ", ".join(f"{1e3 * value + 0.0:.5g}" for value in point) + ") mm"
+    return "(" + ", ".join(f"{round(1e3 * value, 5) + 0.0:.5g}" for value in point) + ") mm"
