@@ -379,7 +379,8 @@ class Acts:
         self._refuse_shape(what)
         sweeps = ["--sobol", str(int(asked["points"]))] if command == "sweep" else []
         folder = self._free_folder(f"{what.stem}-sweep" if sweeps else what.stem)
-        arguments = [command, name, *sweeps, "--out", folder]
+        ranges = ["--no-ranges"] if not sweeps and asked.get("ranges") is False else []
+        arguments = [command, name, *sweeps, *ranges, "--out", folder]
         return self._command.start(arguments, self._path.parent, "" if sweeps else folder)
 
     def make(self, asked: Any) -> dict[str, object]:

@@ -166,7 +166,7 @@ listen(() => {
 
 for (const button of document.querySelectorAll("[data-command]")) button.addEventListener("click", () => attempt(async () => {
   await save();
-  await followToEnd(await ask("/start", { command: button.dataset.command, of: find("of").value, points: find("points").value }));
+  await followToEnd(await ask("/start", { command: button.dataset.command, of: find("of").value, points: find("points").value, ranges: find("ranges").checked }));
 }, find("run-fault")));
 find("more-of").addEventListener("click", () => attempt(async () => {
   await save();
@@ -189,5 +189,5 @@ find("search-sliders").addEventListener("click", () => attempt(async () => {
   find("of").value = study;
   allow();
   say(`written: ${study}`, true);
-  await followToEnd(await ask("/start", { command: "run", of: study }));
+  await followToEnd(await ask("/start", { command: "run", of: study, ranges: find("ranges").checked }));
 }, find("search-fault")));

@@ -177,7 +177,9 @@ def test_a_study_is_asked_with_limits_in_the_units_of_the_page(served: Served) -
 
 
 def test_a_report_is_begun_beside_a_command(served: Served) -> None:
-    started = served.ask("/start", {"command": "simulate", "of": "design.toml"})
+    asked = {"command": "simulate", "of": "design.toml", "ranges": False}
+    started = served.ask("/start", asked)
+    assert "--no-ranges" in started["command"]
     assert started["exit"] is None
     now = served.ask("/make", {"paper": "sheet", "of": "results/none"})
     assert now["command"] == "chamberopt report ./results/none --sheet"
