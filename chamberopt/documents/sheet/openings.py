@@ -49,10 +49,13 @@ def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         beyond = _beyond(way, openings, held, how)
         rows.append(("opening", f"{opening_in_words(way)} at {place_of(way)} mm{frame}; {beyond}"))
     yield from first_rows(rows, "openings")
-    for rib in thin_ribs(openings):
-        both = " and ".join(f"the opening in {_wall_of(way)}" for way in (rib.one, rib.other))
-        width = plain(1e3 * rib.width, 2)
-        yield "no rib", f"{width} mm between {both} do not stand: cut both as one"
+    if ribs := thin_ribs(openings):
+        between = " and ".join(
+            f"{plain(1e3 * rib.width, 2)} mm between those in {_wall_of(rib.one)} and "
+            f"{_wall_of(rib.other)}"
+            for rib in ribs
+        )
+        yield "no rib", f"{between}: so little does not stand, cut these openings as one"
     faces = {"holder": holder.at if holder else None, "mask": mask.at if mask else None}
     for name, one in result.record.chamber.fixtures.items():
         size = size_in_words(one.kind, one.size_mm)

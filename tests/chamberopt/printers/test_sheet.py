@@ -141,8 +141,8 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
         if one.rows and one.caption == "Chamber"
     ).rows
     assert dict(rows)["no rib"] == (
-        "0.7 mm between the opening in the wall at +y and the opening in the ceiling do not "
-        "stand: cut both as one"
+        "0.7 mm between those in the wall at +y and the ceiling: so little does not stand, cut "
+        "these openings as one"
     )
     forms = [
         first._replace(form="round", size=(0.0604, 0.06041), way=(0.0, 0.89, -0.456)),
