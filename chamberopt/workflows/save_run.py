@@ -145,11 +145,13 @@ def _draw_start_and_best(folder: Path, study_result: StudyResult, threads: Execu
     Return remarks on skipped pictures.
     """
     start, best = study_result.start.evaluation, study_result.best.evaluation
-    folders, names = [folder / START, folder], ["start", "best design"]
+    is_start = study_result.best is study_result.start
+    best_name = "best design, which is the start" if is_start else "best design"
+    folders, names = [folder / START, folder], ["start", best_name]
     pictures = [
         threads.submit(_draw_coverage, *one)
         for one in (
-            ([folder], [best], ["best design"], folder / "coverage.png"),
+            ([folder], [best], [best_name], folder / "coverage.png"),
             (folders, [start, best], names, folder / "before_after.png"),
         )
     ]
