@@ -97,7 +97,7 @@ export class Plot {
 
 // Parallel coordinates: an axis for each number, and a line for each candidate.
 export function parallel({ width, height, axes, candidates, valueOf, colourOf, chosen }) {
-  const top = 34, bottom = height - 22, across = (k) => 20 + k * (width - 60) / Math.max(1, axes.length - 1);
+  const top = 46, bottom = height - 22, across = (k) => 20 + k * (width - 60) / Math.max(1, axes.length - 1);
   const drawing = svg("svg", { width, height, role: "img" }, svg("title", {}, "all numbers of each candidate"));
   const scales = axes.map((one) => scaleOf(one, bottom, top));
   for (const one of candidates) {
