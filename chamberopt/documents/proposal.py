@@ -221,10 +221,22 @@ def _sentence(made: Proposal) -> str:
         one = f"in setting {made.strips.chosen + 1} of {count}"
         strips = f", {f'in each of {count} settings' if made.strips.are_alike else one}"
     return (
-        f"Peen {one_line(_target(made))} ({area}{strips}) of "
+        f"Peen {_in_short(one_line(_target(made)))} ({area}{strips}) of "
         f"{one_line(design.part.mesh_path.name)} for {_time(made)} with {balls}, the sonotrode at "
         f"{design.sonotrode.zero_to_peak_um:g} µm zero-to-peak.{_intensity(made)}"
     )
+
+
+def _in_short(target: str) -> str:
+    """Return the name of a target with its numbered faces as one list.
+
+    >>> _in_short("face 1, face 6, face 7")
+    'faces 1, 6 and 7'
+    """
+    numbers = re.findall(r"(?:^|, )face ([\d.]+)(?=, |$)", target)
+    if len(numbers) < 2 or target != ", ".join(f"face {one}" for one in numbers):
+        return target
+    return f"faces {', '.join(numbers[:-1])} and {numbers[-1]}"
 
 
 def _intensity(made: Proposal) -> str:
@@ -305,7 +317,7 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
 
 def _balls(made: Proposal) -> Iterator[str]:
     """Yield the charge of balls of each size, in the order in which they are taken."""
-    material, seen = made.tables["shot"]["material"], set()
+    material, seen = made.tables["shot"]["material"].replace("_", " "), set()
     for one in made.design.in_steps.values():
         size = 1e3 * one.shot.diameter
         if size not in seen:
