@@ -87,7 +87,7 @@ function lookAtAll(way = placed.way) {
   const high = outer.map((x, i) => Math.max(x, Math.min(x + room, placed.part_mm[1][i])));
   const size = Math.hypot(...high.map((x, i) => x - low[i])), centre = mid(low, high);
   fitted = [low, high];
-  view.look({ middle: centre, eye: centre.map((x, i) => x + 2.6 * size * way[i]), size });
+  view.look({ middle: centre, eye: centre.map((x, i) => x + 2.8 * size * way[i]), size });
 }
 
 view.renderer.domElement.addEventListener("dblclick", () => { if (placed) lookAtAll(); });
