@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from manifold3d import Manifold
+from manifold3d import CrossSection, Manifold
 
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.meshes.part_mesh import PartMesh
@@ -114,6 +114,19 @@ def test_a_bowl_is_none() -> None:
     body = trimesh.creation.revolve(1e-3 * profile[::-1], sections=64)
     assert body.is_watertight
     assert not len(fillets_of(part((body.vertices, body.faces))).curvature)
+
+
+def test_a_fillet_beside_a_face_that_is_a_little_hollow_is_found() -> None:
+    """An upright plate, a fillet of 3 mm, and a floor that rises along a radius of 100 mm."""
+    turn, rise = np.radians(np.linspace(180, 270, 10)), np.linspace(0.0, 0.3, 12)
+    fillet = np.column_stack([3.0 + 3.0 * np.cos(turn), 3.0 + 3.0 * np.sin(turn)])
+    floor = np.column_stack([3.0 + 100.0 * np.sin(rise), 100.0 - 100.0 * np.cos(rise)])
+    back = [[floor[-1, 0], -10.0], [-10.0, -10.0], [-10.0, 40.0], [0.0, 40.0]]
+    section = CrossSection([np.concatenate([fillet, floor[1:], back])[::-1]])
+    mesh = section.extrude(30.0).to_mesh()
+    solid = 1e-3 * mesh.vert_properties.astype(float), np.asarray(mesh.tri_verts)
+    (curvature,) = fillets_of(part(solid)).curvature
+    assert 3e-3 * curvature == pytest.approx(1.0, abs=0.1)
 
 
 def test_of_a_large_scan_none_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
