@@ -198,7 +198,7 @@ def colour_range(parts: Sequence[DrawnPart]) -> tuple[float, float]:
     if not is_share:
         return _round_range(low, high)
     step = 5.0 if high - low < 20.0 else 10.0
-    low = max(0.0, step * np.floor(low / step))
+    low = min(max(0.0, step * np.floor(low / step)), 100.0 - step)
     return low, min(100.0, max(low + step, step * np.ceil(high / step)))
 
 

@@ -1,9 +1,12 @@
 """What of a target is outside the chamber is told from what no ball can touch."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 
 from chamberopt.pictures.actors import colour_meanings
-from chamberopt.pictures.drawn_part import DrawnPart
+from chamberopt.pictures.drawn_part import DrawnPart, _round_range, colour_range
 from chamberopt.results.vtp_files import Surface, pyvista
 
 
@@ -42,3 +45,22 @@ def test_what_is_outside_the_chamber_is_apart() -> None:
     assert part.unreached.n_cells > 0
     meanings = [meaning for _, meaning in colour_meanings([part])]
     assert meanings == ["out of the shot's reach", "target outside the chamber"]
+
+
+def shown(value: float) -> DrawnPart:
+    """A wall whose coverage is the same everywhere [%]."""
+    field = wall(0.0, 10.0)
+    field.cell_data["area"] = np.ones(field.n_cells)
+    field.point_data["shown"] = np.full(field.n_points, value)
+    part: Any = SimpleNamespace(target=field, quantity=SimpleNamespace(unit="%"))
+    return part
+
+
+def test_a_scale_of_colours_has_a_length_where_all_is_the_same() -> None:
+    assert colour_range([shown(95.0)]) == (95.0, 100.0)
+    assert colour_range([shown(100.0)]) == (95.0, 100.0)
+    assert colour_range([shown(0.0)]) == (0.0, 5.0)
+    assert colour_range([shown(100.0), shown(20.0)]) == (20.0, 100.0)
+    for value in (5.0, 0.37, 1e4):
+        low, high = _round_range(value, value)
+        assert low <= value < high or low < value <= high

@@ -155,3 +155,21 @@ def test_what_stands_against_finer_balls_is_told(
     monkeypatch.setattr(proposed_steps, "build_chamber", refused)
     two, why = with_finer_balls(coarse, found, FINER, lambda _: found)
     assert (two, why) == (None, "part: outside of the chamber")
+
+
+@pytest.mark.parametrize(
+    ("share", "places", "seconds", "is_tried"),
+    [
+        (0.6, False, 10.0, True),  # balls touch too little of it in one pose
+        (0.6, True, 10.0, False),
+        (0.999, False, 10.0, False),
+        (0.999, True, 1e5, True),  # a place of it takes far longer than the mean
+    ],
+)
+def test_a_second_pose_is_tried_for_what_is_hidden_or_uneven(
+    coarse: Proposal, monkeypatch: pytest.MonkeyPatch, share: float, places: bool,
+    seconds: float, is_tried: bool,
+) -> None:  # fmt: skip
+    monkeypatch.setattr(proposed_steps, "touched_share", lambda _: share)
+    found = pilot(10.0, 0.2)._replace(places=places, time_to_98=seconds)
+    assert proposed_steps.is_worth_a_second_pose(coarse, found) is is_tried
