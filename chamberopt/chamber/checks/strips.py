@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from chamberopt.design.design import Design
 
 SAME = 1e-5  # m: places that differ by less are one, as files have them to the micrometre
+# Of the target's length: a longer piece leaves out an end, by which the part is held.
+MOST = 0.7
 LEAST = 0.02  # of a strip: what is left over at an end is none of its own below this share
 
 
@@ -44,7 +46,8 @@ def strip_of_target(design: Design, part: Part) -> StripOfTarget | None:
     """Return the strip of the target that a design peens; None if it peens all of the target.
 
     The strip is what is left of the target between two sides of a box at which it is cut. It is
-    None too where the target is named by the part's file, of which a result keeps no names.
+    None too where only an end is left out, and where the target is named by the part's file, of
+    which a result keeps no names.
     """
     target, file = design.part.target, part.file
     named = target.surface != ("all",)
@@ -60,4 +63,6 @@ def strip_of_target(design: Design, part: Part) -> StripOfTarget | None:
         return None
     axis = int(cut[0])
     ends = max(low[axis], first[axis]), min(high[axis], last[axis])
+    if ends[1] - ends[0] > MOST * (last[axis] - first[axis]):
+        return None
     return StripOfTarget(axis, *map(float, (*ends, first[axis], last[axis])))

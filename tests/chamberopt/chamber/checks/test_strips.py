@@ -37,7 +37,8 @@ def test_a_target_that_is_whole_is_no_strip(tmp_path: Path) -> None:
     wide = {"box_mm": ((-30, -20, -10), (30, 20, 10)), "cut": True}
     corner = {"box_mm": ((-30, -20, -10), (5, 5, 10)), "cut": True}
     uncut = {"box_mm": ((-10, -20, -10), (10, 20, 10)), "cut": False}
-    for box in ({}, wide, corner, uncut):
+    bare = {"box_mm": ((-30, -20, -10), (12, 20, 10)), "cut": True}  # an end of 8 of 40 mm
+    for box in ({}, wide, corner, uncut, bare):
         design = design_of(tmp_path, plate, target={**DOWN, **box})
         assert strip_of_target(design, build_chamber(design).part) is None
     assert StripOfTarget(0, 4.9, 5.1, 0.0, 10.0).settings == 1 + 2 * 25
