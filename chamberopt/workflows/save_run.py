@@ -10,12 +10,7 @@ from typing import TYPE_CHECKING
 from chamberopt.common.files import make_output_folder, whole_or_nothing
 from chamberopt.documents.coverage import summary
 from chamberopt.documents.wording import objective_label
-from chamberopt.pictures.charts.study import (
-    ObjectiveAxis,
-    convergence_picture,
-    pareto_picture,
-    slices_picture,
-)
+from chamberopt.pictures.charts.study import convergence_picture, pareto_picture, slices_picture
 from chamberopt.pictures.charts.sweep import sweep_map
 from chamberopt.pictures.coverage import draw_coverage
 from chamberopt.results.load import START
@@ -130,8 +125,7 @@ def save_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
 
 def _draw_diagrams(folder: Path, study_result: StudyResult) -> None:
     """Draw convergence.png, slices.png and pareto.png of a study, if their data are there."""
-    labels = map(objective_label, study_result.study.objective.goals)
-    axes = [ObjectiveAxis(one.with_unit, one.factor, one.most) for one in labels]
+    axes = [objective_label(one) for one in study_result.study.objective.goals]
     convergence_picture(folder / "convergence.png", study_result, axes[0])
     if study_result.sensitivity:
         slices_picture(folder / "slices.png", study_result, study_result.sensitivity, axes[0])

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -40,21 +40,31 @@ WIDE = (11.0, 3.8)  # inch
 Y_LABEL = 40  # letters of a line that fit beside a chart
 
 
-class ObjectiveAxis(NamedTuple):
-    """How charts name and scale an objective: a time to be short is a time, and not a score."""
+class ObjectiveAxis(Protocol):
+    """How charts name and scale an objective, as documents do: a time to be short is a time."""
 
-    label: str  # with its unit
-    factor: float = 1.0  # shown number over the objective; negative if the smaller is the better
-    most: float = math.inf  # largest number that can be shown
+    @property
+    def with_unit(self) -> str:
+        """Its name with its unit."""
+        ...
+
+    @property
+    def factor(self) -> float:
+        """Shown number over the objective; negative if the smaller is the better."""
+        ...
+
+    @property
+    def most(self) -> float:
+        """Largest number that can be shown."""
+        ...
 
     def scale(self, estimate: Estimate) -> Estimate:
         """Return an objective in the unit of the axis."""
-        half_width = abs(self.factor) * estimate.half_width
-        return Estimate(self.factor * estimate.value, half_width, in_words=estimate.in_words)
+        ...
 
-    def title(self, estimate: Estimate, sign: bool = False) -> str:
+    def number(self, estimate: Estimate, sign: bool = False) -> str:
         """Return an objective as text, with its interval."""
-        return estimate_text(estimate, self.factor, sign=sign)
+        ...
 
 
 @dataclass(frozen=True)
@@ -95,14 +105,14 @@ def convergence_picture(path: Path, result: StudyResult, objective: ObjectiveAxi
     grid = figure.add_gridspec(rows + 1, columns, height_ratios=[1.35, *[1.0] * rows])
     axes = figure.add_subplot(grid[0, :])
     smaller = objective.factor < 0.0
-    draw_convergence(axes, candidates, objective.label, smaller, objective.most)
+    draw_convergence(axes, candidates, objective.with_unit, smaller, objective.most)
     start, best = (one.evaluation.objective for one in (result.start, result.best))
     axes.axhline(
         objective.factor * start.value, color=ORANGE, lw=1.2, ls="--", label="start, as confirmed"
     )
     axes.set_title(
-        f"best {objective.title(best)}, start {objective.title(start)}: "
-        f"change {objective.title(result.gain, sign=True)}",
+        f"best {objective.number(best)}, start {objective.number(start)}: "
+        f"change {objective.number(result.gain, sign=True)}",
         loc="left",
         fontsize=TITLE,
     )
@@ -116,7 +126,7 @@ def convergence_picture(path: Path, result: StudyResult, objective: ObjectiveAxi
         _draw_parameter(axes, result, candidates, name, objective)
         keep_below(axes, objective.most)
         if i % columns == 0:
-            axes.set_ylabel(fill(objective.label, Y_LABEL))
+            axes.set_ylabel(fill(objective.with_unit, Y_LABEL))
         else:
             axes.tick_params(labelleft=False)
         first = first or axes
@@ -268,7 +278,7 @@ def slices_picture(
         result.start.parameters,
         result.best.parameters,
         f"loses no more than {abs(objective.factor) * sensitivity.noise:.2g}",
-        fill(objective.label, Y_LABEL),
+        fill(objective.with_unit, Y_LABEL),
         objective.most,
     )
     save_picture(figure, path)
@@ -391,8 +401,8 @@ def pareto_picture(path: Path, result: StudyResult, objectives: Sequence[Objecti
     )
     style_axes(
         axes,
-        f"{x_axis.label}, better to the {right}",
-        fill(f"{y_axis.label}, better {up}", Y_LABEL),
+        f"{x_axis.with_unit}, better to the {right}",
+        fill(f"{y_axis.with_unit}, better {up}", Y_LABEL),
     )
     axes.legend(fontsize=SMALL, frameon=False)
     save_picture(figure, path)

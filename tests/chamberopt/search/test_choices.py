@@ -14,12 +14,7 @@ from chamberopt.design.load import load_design, save_design
 from chamberopt.design.materials import ball_sizes
 from chamberopt.documents.study import influences
 from chamberopt.documents.wording import Label
-from chamberopt.pictures.charts.study import (
-    ObjectiveAxis,
-    convergence_picture,
-    slices_figure,
-    slices_picture,
-)
+from chamberopt.pictures.charts.study import convergence_picture, slices_figure, slices_picture
 from chamberopt.pictures.charts.sweep import sweep_map
 from chamberopt.results.write import study_record
 from chamberopt.search.run_study import StudyResult
@@ -96,7 +91,7 @@ def test_tables_charts_and_sentences_have_the_texts(searched: StudyResult, tmp_p
     assert recorded.parameters["shot.material"].choices == list(material.texts)
     assert recorded.parameters["shot.material"].flat == ["zirconia"]
     assert recorded.parameters["shot.mass_g"].flat == list(mass.flat)
-    axis = ObjectiveAxis("score")
+    axis = Label("score")
     convergence_picture(tmp_path / "convergence.png", searched, axis)
     slices_picture(tmp_path / "slices.png", searched, found, axis)
     assert (tmp_path / "convergence.png").stat().st_size > 10_000

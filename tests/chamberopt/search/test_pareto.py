@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from chamberopt.pictures.charts.study import ObjectiveAxis, pareto_picture
+from chamberopt.documents.wording import Label
+from chamberopt.pictures.charts.study import pareto_picture
 from chamberopt.search.optimiser.scalarisation import scalarise
 from chamberopt.search.pareto import as_csv, on_front, pareto_points
 from chamberopt.search.study import load_study
@@ -62,7 +63,7 @@ def test_two_objectives_give_a_front(tmp_path: Path) -> None:
     assert "not resolved,," in words
     assert "inf" not in words
     assert all(np.isfinite(goal.half_width) for goals in expected for goal in goals)
-    axes = [ObjectiveAxis("one"), ObjectiveAxis("time [s]", -1.0)]
+    axes = [Label("one"), Label("time", "s", -1.0)]
     pareto_picture(tmp_path / "pareto.png", result, axes)
     assert (tmp_path / "pareto.png").stat().st_size > 10000
     assert load_study(tmp_path / "out" / "study.toml").objective.pareto == (

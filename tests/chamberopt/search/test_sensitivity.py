@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chamberopt.pictures.charts.study import ObjectiveAxis, slices_picture
+from chamberopt.documents.wording import Label
+from chamberopt.pictures.charts.study import slices_picture
 from chamberopt.search.optimiser.search_model import LimitedFigure, Observations, SearchModel
 from chamberopt.search.sensitivity import Sensitivity, analyse_sensitivity, is_supported
 from chamberopt.search.study import Study
@@ -98,7 +99,7 @@ def test_a_study_says_what_its_model_found(tmp_path: Path) -> None:
         tmp_path / "out", lambda d, s, n: judged(bowl(bowl_shares(d)) + np.linspace(-0.01, 0.01, 4))
     )
     assert [one.name for one in result.sensitivity.slices] == list(VARY)
-    slices_picture(tmp_path / "slices.png", result, result.sensitivity, ObjectiveAxis("score"))
+    slices_picture(tmp_path / "slices.png", result, result.sensitivity, Label("score"))
     assert (tmp_path / "slices.png").stat().st_size > 10000
     short = run_bowl(
         tmp_path / "short",
