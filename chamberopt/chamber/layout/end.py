@@ -192,7 +192,7 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
     keys = {**target.keys, "box_mm": box, "cut": True}
     bare = float(area[of_end & target.triangles].sum() / area[target.triangles].sum())
     reason = (
-        f"{target.reason}; AN END IS LEFT BARE, {share:.0%} of its length, {bare:.0%} of the "
+        f"{target.reason}; AN END IS LEFT OUT, {share:.0%} of its length, {bare:.0%} of the "
         "target, to hold it by, in a "
         "soft lining where it is a finished seat: accept it, or peen it in a second setup, end for "
         "end"

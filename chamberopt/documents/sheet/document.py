@@ -114,7 +114,7 @@ def setting_tables(result: Result, built: AsBuilt) -> list[Table]:
         ("Sonotrode", sonotrode_rows(result, built.face_mm)),
         ("Shot", shot_rows(result)),
         ("Steps", step_rows(result, built)),
-        ("To peen a part", run_rows(result)),
+        ("To peen a part", run_rows(result, built.openings)),
         ("Peening, and what to expect", expected_rows(result, built.usual)),
     ])  # fmt: skip
 

@@ -19,7 +19,10 @@ if TYPE_CHECKING:
     from chamberopt.results.load import Result
 
 SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wall is named by it
-EDGE, CLAMPED = 5e-5, 3e-3  # m: narrower openings are none; jaws take what stands out so far
+# m: narrower openings are none, and a wall ends on the part; jaws take what stands out so far, in
+# a thin wall at least.
+EDGE, CLAMPED, SHORT = 5e-4, 3e-3, 15e-3
+CLAMP = "clamp it there"
 GUIDED = "guide it there in a bushing, stopped along its axis"  # of a part that turns
 MOUNTED: dict[Mounting, str] = {
     "part goes in": "the part goes in from outside",
@@ -31,7 +34,7 @@ MOUNTED: dict[Mounting, str] = {
 def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     """Yield rows on what holds the part, where it goes out, and what masks it."""
     holder, openings = result.design.holder, built.openings
-    held = "clamp it there" if result.design.effects.part_turn is None else GUIDED
+    held = CLAMP if result.design.effects.part_turn is None else GUIDED
     if holder is not None and holder.kind == "bore":
         play = "tight"
         if holder.clearance_mm:
@@ -154,4 +157,6 @@ def _beyond(one: Opening, openings: Sequence[Opening], held: str, mounted: str) 
     if one.wider is not None:
         size = " × ".join(plain(round(1e3 * x, 1)) for x in one.wider)
         wider = f"; it widens to {size} mm within {plain(1e3 * PLATE)} mm outside"
+    if clamp and held == CLAMP and one.beyond < SHORT:
+        clamp += ", so make the wall thin there"
     return f"the part stands out by {plain(1e3 * one.beyond, 2)} mm{clamp}{mounted}{wider}"

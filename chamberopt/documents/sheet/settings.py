@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.layout.pose import axis_down
 from chamberopt.common.key_words import in_words
 from chamberopt.design.fixture import joint_in_words, slit_in_words, slit_mm
@@ -27,10 +28,12 @@ from chamberopt.documents.sheet.rows import (
     with_limits,
 )
 from chamberopt.documents.study import exposed_target
+from chamberopt.documents.wanted import time_lines
 from chamberopt.documents.wording import per_cent, plain
 from chamberopt.documents.zones import turned
 
 if TYPE_CHECKING:
+    from chamberopt.chamber.checks.openings import Opening
     from chamberopt.chamber.checks.strips import StripOfTarget
     from chamberopt.results.load import Result
 
@@ -184,7 +187,8 @@ def sonotrode_rows(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
         yield "wall round the face", "; ".join(sides)
     gap = slit_in_words(1e3 * min(design.ball_diameters))
     if over := _over_face(result):
-        yield "walls over the face", f"at both ends of the {over}, clear of it by {gap}"
+        least = plain(0.5 * LEAST_SLIT_MM)
+        yield "walls over the face", f"at both ends of the {over}, clear of it by {least} mm, {gap}"
     if face is not None and face.count > 1:
         yield "gaps between the blocks", f"{gap}, half a ball"
     yield "frequency", f"{plain(design.sonotrode.frequency_khz)} kHz"
@@ -240,20 +244,32 @@ def step_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
             yield from first_rows([(f"opening, step {number}", one) for one in found], "openings")
 
 
-def run_rows(result: Result) -> Iterator[Row]:
-    """Yield what an operator does for each part, in its order."""
+def run_rows(result: Result, openings: Sequence[Opening] = ()) -> Iterator[Row]:
+    """Yield what an operator does for each part, in its order.
+
+    Args:
+        openings: through which the part goes out. One that goes out through the ceiling closes the
+            chamber, so that the balls are there before it.
+    """
     design = result.design
+    mount = "the part as above; measure from it to the face at rest"
     if design.effects.part_turn is not None:
-        yield "1 mount", "the part and its drive; turn it once by hand: it touches no wall"
-    else:
-        yield "1 mount", "the part as above; measure from it to the face at rest"
+        mount = "the part and its drive; turn it once by hand: it touches no wall"
     steps = [*design.in_steps.values()]
-    yield "2 fill", f"{plain(weighed_g(steps[0].shot), 3)} g of balls, weighed; close the chamber"
+    fill = f"{plain(weighed_g(steps[0].shot), 3)} g of balls, weighed"
+    if any(one.wall == CEILING for one in openings):
+        yield "1 fill", fill
+        yield "2 mount", f"{mount}; it closes the chamber"
+    else:
+        yield "1 mount", mount
+        yield "2 fill", f"{fill}; close the chamber"
     each = ", then ".join(
         f"{plain(one.process.treatment_time)} s as step {k}" for k, one in enumerate(steps, 1)
     )
     time = f"{plain(design.process.treatment_time)} s"
-    yield "3 peen", f"{time}: {each} (see Steps)" if design.steps else time
+    too_short = any(one.warns for one in time_lines(result)[:1])
+    short = "; NOT YET SET, as it may be too short: see above" if too_short else ""
+    yield "3 peen", f"{time}: {each} (see Steps){short}" if design.steps else f"{time}{short}"
     yield "4 weigh", "the balls again: what lacks is in a gap or in the part"
     missed = 1.0 - result.record.field.reachable_share
     but = f" but the {per_cent(missed)} that no ball can touch: see Warnings"

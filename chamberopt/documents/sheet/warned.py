@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
 WIDEST_FACE = 90.0  # mm: larger faces need slots or are several (chamber/usual_shop.toml)
 # What is for who designs: options of commands, and how well a rule is founded.
 OF_COMMANDS = r" \((?:[^()]*--[^()]*|no source read)\)"
+# Factor beside the usual range up to which an intensity without strips counts as in it: those of
+# pilots and of results differ by as much.
+ROUGHLY = 1.33
 OF_STRIPS = ("strength_um", "saturation_time_s", "compression_depth_um")
 
 
@@ -76,7 +80,8 @@ def unusual_intensity(result: Result, usual: WantedIntensity | None) -> Iterator
     found = PredictedIntensity.of(result.metrics, design.calibration)
     if usual is None or found is None or design.process.intensity_mmA is not None:
         return
-    if off := usual.off(found.value):
+    off = usual.off(found.value)
+    if abs(off) > (math.log(ROUGHLY) if design.calibration is None else 0.0):
         yield (
             f"The expected Almen intensity, {plain(found.value, 2)} mmA, is "
             f"{'below' if off < 0.0 else 'above'} {range_text(usual)}, {usual.text}: agree on it, "

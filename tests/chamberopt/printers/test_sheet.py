@@ -103,7 +103,10 @@ def test_its_figures_are_those_of_the_report(folder: Path) -> None:
     assert rows["Shot"]["balls"] == "30 of Ø 3 mm"
     assert rows["Chamber"]["diameter"] == "50 mm"
     assert rows["To peen a part"]["2 fill"].startswith(rows["Shot"]["mass of these balls"][:4])
-    assert rows["To peen a part"]["3 peen"] == expected["peening time"]
+    assert (
+        rows["To peen a part"]["3 peen"]
+        == f"{expected['peening time']}; NOT YET SET, as it may be too short: see above"
+    )
     assert "Amplitude: 46 to 54 µm, ± 4 µm peak to valley" in rows["Tolerances"][""]
     assert "others are not known" in rows["Tolerances"][""]
     assert "was not checked" in rows["Warnings"][""]
@@ -126,7 +129,7 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
     rows = next(one for one in tables if one.caption == "Chamber").rows
     assert [text for name, text in rows if name == "opening"] == [
         "60 × 80 mm in the wall at +y, its middle at (0, 40, 62.4) mm in the chamber's frame; "
-        "the part stands out by 9.3 mm: clamp it there",
+        "the part stands out by 9.3 mm: clamp it there, so make the wall thin there",
         "12 × 80 mm in the wall at −x, its middle at (−40, 0, 62.4) mm; the part fills it",
         "12 mm of the ceiling, which ends on the part, at (0, 0, 119) mm; the part stands out "
         "by 1.2 mm",
