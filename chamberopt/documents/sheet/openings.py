@@ -38,7 +38,7 @@ def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     if holder is not None and holder.kind == "bore":
         play = "tight"
         if holder.clearance_mm:
-            play = f"{plain(holder.clearance_mm)} mm of clearance all round, beyond the sizes below"
+            play = f"{plain(holder.clearance_mm)} mm of clearance all round, in the sizes below"
         yield "holder", f"the part itself, out through the wall, {play}"
     mask = result.design.mask
     if holder is None and not result.record.chamber.pieces_in_air:
@@ -50,7 +50,8 @@ def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         frame = "" if number else " in the chamber's frame"
         how = f"; {MOUNTED[built.mountings[number]]}" if built.mountings else ""
         beyond = _beyond(way, openings, held, how)
-        rows.append(("opening", f"{opening_in_words(way)} at {place_of(way)} mm{frame}; {beyond}"))
+        cut = opening_in_words(way, clearance_of(result))
+        rows.append(("opening", f"{cut} at {place_of(way)} mm{frame}; {beyond}"))
     yield from first_rows(rows, "openings")
     if ribs := thin_ribs(openings):
         between = " and ".join(
@@ -101,19 +102,34 @@ def _grip(holder: Holder) -> str:
     return f"; {plain(holder.grip_mm)} mm of it round the part, in two halves that clamp it"
 
 
-def opening_in_words(one: Opening) -> str:
-    """Return in words how large an opening is, and in which wall."""
-    sides = [plain(round(1e3 * x, 1) + 0.0) for x in one.size]
-    wall = _wall_of(one)
+def clearance_of(result: Result) -> float:
+    """Return the clearance [m] round a part in the openings through which it goes out."""
+    holder = result.design.holder
+    return 0.0 if holder is None else holder.clearance
+
+
+def opening_in_words(one: Opening, clear: float = 0.0) -> str:
+    """Return in words how large an opening is cut, and in which wall.
+
+    Args:
+        clear: clearance round the part [m]. Along the part's section it is told beside the outline.
+    """
+    wall, wider = _wall_of(one), 0.0 if one.form == "other" else 2.0 * clear
     if one.form == "edge" or min(one.size) < EDGE:
-        return f"{sides[int(np.argmax(one.size))]} mm of {wall}, which ends on the part,"
+        return f"{_side(max(one.size))} mm of {wall}, which ends on the part,"
     if one.form == "round":
-        return f"round, Ø {plain(round(500.0 * sum(one.size), 1))} mm, in {wall}, its middle"
-    size = f"{' × '.join(sides)} mm"
+        return f"round, Ø {_side(0.5 * sum(one.size) + wider)} mm, in {wall}, its middle"
+    size = f"{' × '.join(_side(x + wider) for x in one.size)} mm"
     if one.form == "other":
+        size += " without clearance" if clear else ""
         section = "along the part's section" if one.outline is None else "as on the last page"
         return f"{section}, within {size}, in {wall}, its middle"
     return f"{size} in {wall}, its middle"
+
+
+def _side(length: float) -> str:
+    """Return a length [m] in mm as text."""
+    return plain(round(1e3 * length, 1) + 0.0)
 
 
 def place_of(one: Opening) -> str:

@@ -16,7 +16,12 @@ from chamberopt.design.fixture import joint_in_words, slit_in_words, slit_mm
 from chamberopt.design.materials import alloys, find
 from chamberopt.design.tolerances import tolerance_box
 from chamberopt.documents.answer import answer_lines
-from chamberopt.documents.sheet.openings import fixture_rows, opening_in_words, place_of
+from chamberopt.documents.sheet.openings import (
+    clearance_of,
+    fixture_rows,
+    opening_in_words,
+    place_of,
+)
 from chamberopt.documents.sheet.rows import (
     AsBuilt,
     Row,
@@ -236,7 +241,7 @@ def step_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         yield "", "Tables and the drawing here are of the first step; the others differ from it:"
     yield from (("", one.text) for one in answer_lines(result) if one.about == "step")
     first, *others = (
-        [f"{opening_in_words(one)} at {place_of(one)} mm" for one in openings]
+        [f"{opening_in_words(one, clearance_of(result))} at {place_of(one)} mm" for one in openings]
         for openings in (built.openings, *built.later)
     )
     for number, found in enumerate(others, start=2):

@@ -128,9 +128,9 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
     tables = setting_tables(bore, AsBuilt((50.0,), openings))
     rows = next(one for one in tables if one.caption == "Chamber").rows
     assert [text for name, text in rows if name == "opening"] == [
-        "60 × 80 mm in the wall at +y, its middle at (0, 40, 62.4) mm in the chamber's frame; "
+        "60.4 × 80.4 mm in the wall at +y, its middle at (0, 40, 62.4) mm in the chamber's frame; "
         "the part stands out by 9.3 mm: clamp it there, so make the wall thin there",
-        "12 × 80 mm in the wall at −x, its middle at (−40, 0, 62.4) mm; the part fills it",
+        "12.4 × 80.4 mm in the wall at −x, its middle at (−40, 0, 62.4) mm; the part fills it",
         "12 mm of the ceiling, which ends on the part, at (0, 0, 119) mm; the part stands out "
         "by 1.2 mm",
     ]
@@ -154,11 +154,11 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
     tables = setting_tables(bore, AsBuilt((50.0,), forms))
     told = next(one for one in tables if one.caption == "Chamber").rows
     circle, section = (text.split(" in the wall")[0] for name, text in told if name == "opening")
-    assert circle == "round, Ø 60.4 mm,"
+    assert circle == "round, Ø 60.8 mm,"
     assert dict(told)["opening"].count("in the wall at +y, its middle") == 1
-    assert section == "along the part's section, within 60 × 80 mm,"
+    assert section == "along the part's section, within 60 × 80 mm without clearance,"
     assert "it widens to 61.2 × 80 mm within 10 mm outside" in dict(told)["opening"]
-    assert "0.2 mm of clearance all round, beyond the sizes below" in dict(rows)["holder"]
+    assert "0.2 mm of clearance all round, in the sizes below" in dict(rows)["holder"]
     assert dict(rows)["gaps"].startswith("round the part as above, of all other joints at most 0.4")
     assert rows_of(result)["Chamber"]["gaps"].startswith("of joints and openings at most 0.42 mm")
 
