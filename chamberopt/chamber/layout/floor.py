@@ -222,8 +222,8 @@ def _over_the_face(sizes: Sizes, shop: Shop, stand: Stand) -> Floor:
         wide = " x ".join(f"{one + 2.0 * shop.clearance_mm:g}" for one in sides)
         are = "is" if face.count == 1 else "and the gaps between the blocks are"
         return (
-            f"BUILD IT {wide} mm wide: the slit of {shop.clearance_mm:g} mm on each side of {name} "
-            f"{are} not simulated"
+            f"BUILD IT {wide} mm wide, within the limits on the sheet: the slit of "
+            f"{shop.clearance_mm:g} mm on each side of {name} {are} not simulated"
         )
 
     plan = dict(zip(("length_mm", "width_mm"), face.sides_mm, strict=True))

@@ -61,8 +61,8 @@ def test_a_wall_round_a_face_is_wider_by_its_clearance(clear: float) -> None:
     wide = 60.0 + 2.0 * clear
     found = floor({"diameter_mm": 52.0}, "cylinder", own)
     assert (
-        f"the wall round it {clear:g} mm clear; BUILD IT {wide:g} mm wide: the slit of "
-        f"{clear:g} mm on each side" in found.reason
+        f"the wall round it {clear:g} mm clear; BUILD IT {wide:g} mm wide, within the limits on "
+        f"the sheet: the slit of {clear:g} mm on each side" in found.reason
     )
     found = floor({"length_mm": 110.0, "width_mm": 30.0}, "box", own)
     assert found.reason.endswith(f"the wall ends over its face, {clear:g} mm clear")
