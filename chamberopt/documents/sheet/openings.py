@@ -24,6 +24,7 @@ SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wal
 EDGE, CLAMPED, SHORT = 5e-4, 3e-3, 15e-3
 CLAMP = "clamp it there"
 GUIDED = "guide it there in a bushing, stopped along its axis"  # of a part that turns
+THROUGH = "; it goes on through the wall, fixed there, or in bearings and sealed"
 MOUNTED: dict[Mounting, str] = {
     "part goes in": "the part goes in from outside",
     "wall goes over": "the wall goes over it from outside",
@@ -77,6 +78,7 @@ def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
             text += f", from ({at}) mm along ({along}) in the chamber's frame"
         if holder is not None and name == "holder":
             text += _flanges(holder) + _grip(holder)
+            text += THROUGH if holder.kind == "arbor" else ""
         chosen = faces[name]
         where = f" ({', '.join(chosen.surface)})" if chosen and chosen.surface != ("all",) else ""
         yield name, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part{where}"
