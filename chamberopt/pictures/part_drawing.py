@@ -401,6 +401,10 @@ def _draw_jaws(axes: Axes, view: View, lines: np.ndarray) -> bool:
         edges = [(float(one[0]), float(one[-1])) for one in crossed]
         if np.ptp(edges, axis=0).max() > JAWS_OFF:
             continue
+        # Sides beyond a line where the part is broken off are not drawn.
+        shown = (-math.inf, high[1] + above) if axis == 0 else (low[0] - sides, high[0] + sides)
+        if edges[0][0] < shown[0] - JAWS_OFF or edges[0][1] > shown[1] + JAWS_OFF:
+            continue
         has_jaws = True
         for edge, outwards in zip(edges[0], (-1.0, 1.0), strict=True):
             corner = min(start, start + way * JAWS_LONG), min(edge, edge + outwards * JAWS_THICK)

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from chamberopt.results.load import Result
 
 SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wall is named by it
-# m: narrower openings are none, and a wall ends on the part; jaws take what stands out so far, in
-# a thin wall at least.
+# m: narrower openings are none, and a wall ends on the part; jaws take what stands out so far;
+# through one opening alone, in a thin wall at least.
 EDGE, CLAMPED, SHORT = 5e-4, 3e-3, 15e-3
 CLAMP = "clamp it there"
 GUIDED = "guide it there in a bushing, stopped along its axis"  # of a part that turns
@@ -175,6 +175,6 @@ def _beyond(one: Opening, openings: Sequence[Opening], held: str, mounted: str) 
     if one.wider is not None:
         size = " × ".join(plain(round(1e3 * x, 1)) for x in one.wider)
         wider = f"; it widens to {size} mm within {plain(1e3 * PLATE)} mm outside"
-    if clamp and held == CLAMP and one.beyond < SHORT:
+    if clamp and held == CLAMP and one.beyond < SHORT and len(openings) == 1:
         clamp += ", so make the wall thin there"
     return f"the part stands out by {plain(1e3 * one.beyond, 2)} mm{clamp}{mounted}{wider}"

@@ -129,11 +129,14 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
     rows = next(one for one in tables if one.caption == "Chamber").rows
     assert [text for name, text in rows if name == "opening"] == [
         "60.4 × 80.4 mm in the wall at +y, its middle at (0, 40, 62.4) mm in the chamber's frame; "
-        "the part stands out by 9.3 mm: clamp it there, so make the wall thin there",
+        "the part stands out by 9.3 mm: clamp it there",
         "12.4 × 80.4 mm in the wall at −x, its middle at (−40, 0, 62.4) mm; the part fills it",
         "12 mm of the ceiling, which ends on the part, at (0, 0, 119) mm; the part stands out "
         "by 1.2 mm",
     ]
+    alone = setting_tables(bore, AsBuilt((50.0,), openings[:1]))
+    (told,) = [text for one in alone for name, text in one.rows if name == "opening"]
+    assert told.endswith("clamp it there, so make the wall thin there")
     first = openings[0]
     sides = np.array([[[-0.03, 0.0], [0.03, 0.0]]])
     below = first._replace(place=(0.0, 0.04, 0.1), outline=sides)
