@@ -43,6 +43,7 @@ MAIN = (
 )
 
 
+ROUNDING = 1e-6  # of a time
 TELLS_APART = "The time to 98 % there tells places apart."
 
 
@@ -250,6 +251,10 @@ def _over_time(curves: Mapping[str, Sequence[CoverageAtTime]], treatment_time: f
         "often narrower than their line. The thin line is zero where more than 5 % of the "
         "target is out of reach."
     )
+    end = min((rows[-1].time_s for rows in curves.values()), default=treatment_time)
+    if end < (1.0 - ROUNDING) * treatment_time:
+        ends = f"It ends at {plain(end, 3)} s" if end > ROUNDING * treatment_time else "It is empty"
+        caption += f" {ends}, as later means take more simulated dents: simulate longer."
     return Chart("against-time", coverage_over_time_figure(curves, treatment_time), caption)
 
 
