@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import fcntl
 import io
 import os
@@ -117,11 +118,17 @@ def run_traced(words: Sequence[str]) -> int:
     return status
 
 
+# A picture of one pixel, which a process sheet can show.
+PIXEL = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+)
+
+
 def run_drawing(words: Sequence[str]) -> int:
     """Run a command, or "save"; pictures of VTK are written, but have nothing on them."""
 
     def drawn(render: Any, job: Any, picture: str | Path, *_: Any, **__: Any) -> None:
-        written.write_bytes(Path(picture), b"a picture")
+        written.write_bytes(Path(picture), PIXEL)
 
     subprocess_drawing.missing_opengl = lambda: None
     for module in list(sys.modules.values()):
