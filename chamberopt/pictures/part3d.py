@@ -200,7 +200,7 @@ def _block(face: Face | None) -> dict[str, dict[str, object]]:
     if face is None:
         return {}
     points, triangles = face.body
-    return {"block": _shape(MM * points, triangles) | {"kind": "sonotrode", "opacity": 1}}
+    return {"block": _shape(MM * points, triangles) | {"kind": "sonotrode"}}
 
 
 def _shape(points: np.ndarray, triangles: np.ndarray) -> dict[str, object]:

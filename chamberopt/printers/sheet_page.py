@@ -27,6 +27,7 @@ from chamberopt.documents.document import Block, Document, Section, Sentence, Ta
 from chamberopt.documents.sheet import (
     AsBuilt,
     chamber_limits,
+    clearance_of,
     drawn_openings,
     outlines_in_words,
     process_sheet,
@@ -275,7 +276,7 @@ def write_sheet(
     with claim_file(path):
         chamber = load_chamber(loaded)
         design, part, openings = loaded.design, chamber.part, find_openings(chamber)
-        clear = 1e-3 * (design.holder.clearance_mm if design.holder else 0.0)
+        clear = clearance_of(loaded)
         built = AsBuilt(
             face_size_mm(chamber),
             openings,

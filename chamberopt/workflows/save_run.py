@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.common.files import make_output_folder, whole_or_nothing
 from chamberopt.documents.coverage import summary
+from chamberopt.documents.study import evaluated
 from chamberopt.documents.wording import objective_label
 from chamberopt.pictures.charts.study import convergence_picture, pareto_picture, slices_picture
 from chamberopt.pictures.charts.sweep import sweep_map
@@ -126,7 +127,8 @@ def save_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
 def _draw_diagrams(folder: Path, study_result: StudyResult) -> None:
     """Draw convergence.png, slices.png and pareto.png of a study, if their data are there."""
     axes = [objective_label(one) for one in study_result.study.objective.goals]
-    convergence_picture(folder / "convergence.png", study_result, axes[0])
+    candidates = [evaluated(one, axes[0]) for one in study_result.trials]
+    convergence_picture(folder / "convergence.png", study_result, candidates, axes[0])
     if study_result.sensitivity:
         slices_picture(folder / "slices.png", study_result, study_result.sensitivity, axes[0])
     if study_result.study.objective.pareto:

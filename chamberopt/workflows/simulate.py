@@ -102,9 +102,6 @@ def teller_of(progress: Progress | bool) -> Teller:
     return Teller(progress or None)
 
 
-SAVING = "writing and drawing"
-
-
 @dataclass(frozen=True)
 class SimulationSettings:
     """How a design is simulated.
@@ -178,7 +175,7 @@ def simulate_design(
     teller.compile(design, chamber, cavity)
     found, ranges = None, None
     # What follows the replicas takes as long again, which a user who waits is to know.
-    first, then, last = steps = settings.step, ENDS, SAVING
+    first, then, last = steps = settings.step, ENDS, "writing and drawing"
     if settings.ranges and unknowns(design):
         first, then, last = (f"step {k} of 3: {one}" for k, one in enumerate(steps, 1))
     with teller.step(first, Effort.of(design.process.accuracy).most) as progress:

@@ -9,7 +9,7 @@ from chamberopt.documents.sheet.document import (
     title_block,
 )
 from chamberopt.documents.sheet.expected import calibrated_to, first_checks
-from chamberopt.documents.sheet.openings import drawn_openings, outlines_in_words
+from chamberopt.documents.sheet.openings import clearance_of, drawn_openings, outlines_in_words
 from chamberopt.documents.sheet.rows import AsBuilt, amplitude_text, key_row
 from chamberopt.documents.sheet.settings import chamber_limits, slit_limits
 from chamberopt.documents.sheet.warned import alarms, cautions
@@ -22,6 +22,7 @@ __all__ = [
     "calibrated_to",
     "cautions",
     "chamber_limits",
+    "clearance_of",
     "design_sha256",
     "drawn_openings",
     "first_checks",

@@ -130,13 +130,13 @@ def opening_in_words(one: Opening, clear: float = 0.0) -> str:
 
 
 def _side(length: float) -> str:
-    """Return a length [m] in mm as text."""
+    """Return a length or a coordinate [m] in mm as text."""
     return plain(round(1e3 * length, 1) + 0.0)
 
 
 def place_of(one: Opening) -> str:
     """Return the middle of an opening [mm] as text."""
-    return f"({', '.join(plain(round(1e3 * x, 1) + 0.0) for x in one.place)})"
+    return f"({', '.join(map(_side, one.place))})"
 
 
 def _wall_of(one: Opening) -> str:
@@ -173,7 +173,7 @@ def _beyond(one: Opening, openings: Sequence[Opening], held: str, mounted: str) 
     clamp = f": {held}" if one.beyond >= min(CLAMPED, farthest) else ""
     wider = ""
     if one.wider is not None:
-        size = " × ".join(plain(round(1e3 * x, 1)) for x in one.wider)
+        size = " × ".join(map(_side, one.wider))
         wider = f"; it widens to {size} mm within {plain(1e3 * PLATE)} mm outside"
     if clamp and held == CLAMP and one.beyond < SHORT and len(openings) == 1:
         clamp += ", so make the wall thin there"

@@ -81,7 +81,7 @@ async function drawChamber(isDraft) {
   view.highlight("part", null); // the target has its own colour
   view.pose("part", answer.rotation, answer.shift);
   colourByState(view, "part", seen, answer.state);
-  if (answer.block_points) view.surface("block", { points: answer.block_points, triangles: answer.block_triangles, kind: "sonotrode", opacity: 1 });
+  if (answer.block_points) view.surface("block", { points: answer.block_points, triangles: answer.block_triangles, kind: "sonotrode" });
   else view.remove("block"); // of the proposal before
   view.surface("walls", { points: answer.points, triangles: answer.walls, kind: "wall" });
   view.surface("sonotrode", { points: answer.points.slice(), triangles: answer.sonotrode, kind: "sonotrode" });

@@ -55,7 +55,7 @@ function walls(answer) {
   const surface = (name, kind, triangles, points = answer.points, opacity = undefined) => {
     if (triangles?.length) view.surface(name, { points: points.slice(), triangles: triangles.slice(), kind, opacity });
   };
-  surface("block", "sonotrode", answer.block_triangles, answer.block_points, 1);
+  surface("block", "sonotrode", answer.block_triangles, answer.block_points);
   surface("walls", "wall", answer.walls);
   surface("deflectors", "wall", answer.deflectors);
   surface("sonotrode", "sonotrode", answer.sonotrode);

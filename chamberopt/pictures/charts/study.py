@@ -86,18 +86,17 @@ class EvaluatedCandidate:
     parameters: Mapping[str, float | str] = field(default_factory=dict)
 
 
-def convergence_picture(path: Path, result: StudyResult, objective: ObjectiveAxis) -> None:
-    """Write charts of the objective by order of evaluation and over each parameter, as .png."""
-    candidates = [
-        EvaluatedCandidate(
-            t.number + 1,
-            t.stage,
-            objective.scale(t.objective) if t.objective else None,
-            t.feasible,
-            t.parameters,
-        )
-        for t in result.trials
-    ]
+def convergence_picture(
+    path: Path,
+    result: StudyResult,
+    candidates: Sequence[EvaluatedCandidate],
+    objective: ObjectiveAxis,
+) -> None:
+    """Write charts of the objective by order of evaluation and over each parameter, as .png.
+
+    Args:
+        candidates: all evaluations of the study, in the unit of the objective's axis.
+    """
     names = list(result.study.vary)
     columns = min(len(names), MAX_COLUMNS)
     rows = -(-len(names) // columns)

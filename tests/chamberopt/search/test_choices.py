@@ -12,7 +12,7 @@ from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design, save_design
 from chamberopt.design.materials import ball_sizes
-from chamberopt.documents.study import influences
+from chamberopt.documents.study import evaluated, influences
 from chamberopt.documents.wording import Label
 from chamberopt.pictures.charts.study import convergence_picture, slices_figure, slices_picture
 from chamberopt.pictures.charts.sweep import sweep_map
@@ -92,7 +92,8 @@ def test_tables_charts_and_sentences_have_the_texts(searched: StudyResult, tmp_p
     assert recorded.parameters["shot.material"].flat == ["zirconia"]
     assert recorded.parameters["shot.mass_g"].flat == list(mass.flat)
     axis = Label("score")
-    convergence_picture(tmp_path / "convergence.png", searched, axis)
+    candidates = [evaluated(one, axis) for one in searched.trials]
+    convergence_picture(tmp_path / "convergence.png", searched, candidates, axis)
     slices_picture(tmp_path / "slices.png", searched, found, axis)
     assert (tmp_path / "convergence.png").stat().st_size > 10_000
     places = searched.start.parameters, searched.best.parameters

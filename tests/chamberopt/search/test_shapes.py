@@ -10,6 +10,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
+from chamberopt.documents.study import evaluated
 from chamberopt.documents.wording import Label
 from chamberopt.pictures.charts.study import convergence_picture, slices_picture
 from chamberopt.search.optimiser.domain import Axis, Domain
@@ -114,7 +115,8 @@ def test_the_best_shape_is_found_with_its_own_numbers(
         "chamber.shape", "chamber.across_mm", "chamber.sides", "shot.mass_g",
     }  # fmt: skip
     assert found.slices[0].flat == ("prism",)
-    convergence_picture(tmp_path / "convergence.png", searched, Label("score"))
+    candidates = [evaluated(one, Label("score")) for one in searched.trials]
+    convergence_picture(tmp_path / "convergence.png", searched, candidates, Label("score"))
     slices_picture(tmp_path / "slices.png", searched, found, Label("score"))
     assert not any("chamber.diameter_mm" in note for note in searched.notes)
 

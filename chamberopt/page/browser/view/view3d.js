@@ -3,7 +3,7 @@
 THREE.ColorManagement.enabled = false; // a colour on the screen is the one of the colour bar
 const TEXT_HEIGHT = 0.0115; // over its distance: 2.2 % of the view's height
 const TEXT_PX = 15; // least height on the screen, so that a text is read in a small view too
-const OPACITY = { wall: 0.16, sonotrode: 0.9 }; // of the kinds that are seen through
+const OPACITY = { wall: 0.16, sonotrode: 0.9, block: 1 }; // of what is seen through, by kind; of a surface by its name
 const MARKED = 0.5; // opacity of what marks triangles, so that their own colour is seen
 const FROM_BELOW = 0.08; // opacity of the sonotrode before the part
 const WIDE = 0.7; // width over height of a view that shows all, also what is as wide as its diagonal
@@ -101,7 +101,7 @@ class View3D {
   // Replace a surface. triangles: three numbers of points each; colours: of each triangle, as [r, g, b] in 0..1 one after
   // the other. Where `scale` is set, values between 0 and 1 at the points are its colours (see `paint`).
   // Else its kind gives its colour. A section does not fill the body of an open surface.
-  surface(name, { points, triangles, kind = "", opacity = OPACITY[kind] ?? 1, scale = false, open = false }) {
+  surface(name, { points, triangles, kind = "", opacity = OPACITY[name] ?? OPACITY[kind] ?? 1, scale = false, open = false }) {
     const colour = this.kinds[kind]?.[1] ?? "#ffffff";
     this.remove(name);
     const geometry = new THREE.BufferGeometry();
