@@ -297,7 +297,8 @@ def _arbor(
             f"{list(holder.axis)}; give the walls of one hole, and its axis in the chamber's frame"
         )
     middle = fitted_circle(hull)[0]
-    radius = float(radii(hull, middle)[1]) + SINK
+    within, radius = radii(hull, middle)
+    radius += SINK
     outline = _circle(middle, 2.0 * radius / np.cos(np.pi / SIDES))
     _refuse_off_axis(design, part, frame[2], frame.T[:, :2] @ middle)
     places = part.vertices[walls] @ frame[2]
@@ -307,7 +308,14 @@ def _arbor(
     if holder.both_sides:
         other = frame * [[1.0], [1.0], [-1.0]]
         start, bottom = (low - way for way in _way_out(filled, other, middle, outline, -low))
-    solids = [_prism(frame, outline, bottom, end)]
+    if holder.thickness_mm is None:
+        # The target may begin at the rims of the hole: none of it is covered. The shaft is within
+        # the hole's sides, and what fills its corners ends below the rims.
+        shaft = _circle(middle, 2.0 * within)
+        fill = _prism(frame, outline, low + SINK, high - SINK)
+        solids = [fill, _prism(frame, shaft, bottom, end)]
+    else:
+        solids = [_prism(frame, outline, bottom, end)]
     if holder.diameter_mm is not None and holder.thickness_mm is not None:
         flange, thick = _circle(middle, 1e-3 * holder.diameter_mm), 1e-3 * holder.thickness_mm
         sink = SINK + 1e-3 * (holder.grip_mm or 0.0)

@@ -118,9 +118,9 @@ def arbor_through(
     """Return the keys of [holder] of an arbor through a bore, and the reason for it.
 
     An upright one goes out through the ceiling, a level one through both side walls. The result is
-    None for another axis or one far from the part's centre of mass, if the arbor would hide some of
-    the target, or if wide flanges are wanted and would not close on the part all round at both
-    ends.
+    None for another axis or one far from the part's centre of mass, if some of the target is in
+    front of the bore, or if wide flanges are wanted and would not close on the part all round at
+    both ends.
 
     Args:
         target: marks the triangles to be peened, (m,).
@@ -132,7 +132,7 @@ def arbor_through(
     frame = frame_along(bore.axis)
     corners = (mesh.vertices @ frame.T)[mesh.triangles[target]][..., :2]
     away = float(distances_in_plan(corners, (frame @ bore.point)[:2]).min(initial=math.inf))
-    if away < bore.radius + ball or not carries(mesh, bore.point, bore.axis):
+    if away < FREE * bore.radius or not carries(mesh, bore.point, bore.axis):
         return None
     keys: dict[str, Any] = {"kind": "arbor", "at": {"faces": [bore.wall]}}
     if abs(axis[2]) > UPRIGHT:
@@ -170,6 +170,8 @@ def arbor_through(
         keys |= {"diameter_mm": flange, "thickness_mm": math.ceil(2e3 * thick - 1e-6) / 2.0}
     if "diameter_mm" in keys:
         text += f"; flanges of {keys['diameter_mm']:g} mm on it lie against the part"
+    else:
+        text += "; it expands in the bore, as no flange has room beside the target"
     return keys, text
 
 

@@ -64,9 +64,9 @@ class _Ring(NamedTuple):
             and np.linalg.norm(weight @ places) < CENTRAL * radius
         )
 
-    def is_flat(self, one: Spindle) -> bool:
-        """Return whether all of it looks along an axis, as the flanks of a collar do."""
-        return bool(self.weight @ np.abs(self.normal @ one.axis) > 1.0 - FLAT)
+    def is_one_end(self, one: Spindle) -> bool:
+        """Return whether all of it looks one way along an axis, as one end of a ring does."""
+        return bool(abs(self.weight @ (self.normal @ one.axis)) > 1.0 - FLAT)
 
     def radius(self, one: Spindle) -> float:
         """Return its mean distance from an axis [m]."""
@@ -78,7 +78,7 @@ def turning_bore(bores: Sequence[Bore], mesh: PartMesh, target: np.ndarray) -> B
     """Return the bore about whose axis a part turns on an arbor.
 
     It is None unless the target is a ring at the outside of a short part, alike all round, such as
-    the teeth of a gear or the slots of a disc.
+    the teeth of a gear, the slots of a disc or both sides of one.
 
     Args:
         target: marks the triangles to be peened, (m,).
@@ -90,7 +90,7 @@ def turning_bore(bores: Sequence[Bore], mesh: PartMesh, target: np.ndarray) -> B
         outer = float(np.linalg.norm(whole[:, :2], axis=1).max())
         is_outside = ring.radius(one) > OUTSIDE * outer
         is_short = np.ptp(whole[:, 2]) < SHORT * 2.0 * outer
-        if is_outside and is_short and not ring.is_flat(one) and ring.goes_round(one):
+        if is_outside and is_short and not ring.is_one_end(one) and ring.goes_round(one):
             return bore
     return None
 

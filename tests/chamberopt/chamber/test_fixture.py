@@ -388,7 +388,8 @@ def test_an_arbor_fills_its_hole_and_goes_out(
 ) -> None:
     """The room with an arbor lacks the hole, the shaft from the part to the wall, and flanges.
 
-    The hole and the shaft that fills it are 64-sided polygons in and round a circle of 4 mm.
+    The hole and the shaft that fills it are 64-sided polygons in and round a circle of 4 mm. A
+    shaft without flanges is within the sides of the hole outside of it.
     """
     holder = {"kind": "arbor", "at": THROUGH, "axis": axis, "both_sides": both, **given}
     where = {"rotate_deg": turns, "target": END}
@@ -397,13 +398,25 @@ def test_an_arbor_fills_its_hole_and_goes_out(
 
     sound(chamber)
     assert chamber.pieces_in_air == 0
-    shaft = around(4.0 + 2 * SUNK)
+    shaft = around(4.0 + 2 * SUNK) if given else polygon(4.0 * np.cos(np.pi / 64))
     wide = polygon(5.0) - shaft if given else 0.0
     expected = 8 * polygon(4.0) + outside * shaft + 2 * flanges * wide
     assert 1e9 * (free.volume - chamber.volume) == pytest.approx(expected, rel=2e-3)
     one = chamber.fixtures["holder"]
     assert one.size == pytest.approx((4.002e-3,), rel=1e-6)
     assert 1e3 * one.length == pytest.approx(8 + outside, abs=2 * SUNK)
+
+
+def test_an_arbor_without_flanges_covers_nothing_beside_its_hole(parts: Path) -> None:
+    """The target is the top of the box, and begins at the rim of its hole, which has 12 sides."""
+    drill = trimesh.creation.cylinder(2.0, 20.0, sections=12)
+    drill.apply_translation((-5.0, 0.0, 0.0))
+    body = trimesh.boolean.difference([trimesh.creation.box(BOX), drill], engine="manifold")
+    body.export(parts / "coarse.stl")
+    top = {"direction": (0, 0, 1), "angle_deg": (0, 10)}
+    holder = {"kind": "arbor", "at": THROUGH, "axis": (0, 0, 1)}
+    chamber = build_chamber(design(parts, "coarse", part={"target": top}, holder=holder))
+    assert chamber.fixtures["holder"].covered_target == 0.0
 
 
 @pytest.mark.parametrize("high", [None, 1.0])  # mm: of the keyway; None: all through

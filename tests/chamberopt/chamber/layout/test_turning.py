@@ -21,7 +21,10 @@ from tests.chamberopt.chamber.layout.test_arbor import BALL, drum, part_of, ring
 
 
 def test_a_ring_of_alike_teeth_turns_about_its_bore() -> None:
-    """A toothed disc turns; with half of its teeth as target, or none outside, it does not."""
+    """A toothed disc turns; with half of its teeth as target, or none outside, it does not.
+
+    It turns for both of its sides, and for one alone it does not.
+    """
     teeth = [
         Manifold.cube((6, 3, 12)).translate([28, -1.5, 0]).rotate([0, 0, 360 / 16 * k])
         for k in range(16)
@@ -34,8 +37,15 @@ def test_a_ring_of_alike_teeth_turns_about_its_bore() -> None:
     bore = turning_bore(bores, mesh, outside)
     assert bore is not None
     assert turning_bore(bores, mesh, outside & (middle[:, 0] > 0.0)) is None
-    inside = np.hypot(*middle[:, :2].T) < 29.0
-    assert turning_bore(bores, mesh, inside & ~bore.triangles) is None
+    boss, of_boss = part_of(ring(60, 10, 12) + ring(20, 10, 20))
+    inside = of_boss.triangles_center[:, 2] > 12.5
+    inside &= np.hypot(*of_boss.triangles_center[:, :2].T) > 19.0
+    assert inside.any()
+    assert turning_bore(find_bores(boss, inside), boss, inside) is None
+
+    sides = (np.hypot(*middle[:, :2].T) > 11.0) & (np.abs(body.face_normals[:, 2]) > 0.9)
+    assert turning_bore(bores, mesh, sides) is not None
+    assert turning_bore(bores, mesh, sides & (body.face_normals[:, 2] > 0.0)) is None
 
     turns, turn = turning_pose(bore, mesh)
     level = rotation_matrix(turns) @ bore.axis
