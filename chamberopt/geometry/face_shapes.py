@@ -1,4 +1,4 @@
-"""Tell the shapes of a surface's faces: holes, tubes, teeth, rings of faces, fillets."""
+"""Tell the shapes of a surface's faces: holes, tubes, teeth, rings of faces, fillets, bevels."""
 
 from __future__ import annotations
 
@@ -22,6 +22,9 @@ SWING, PERIODIC, ANGLES = 0.02, 0.8, 720
 # A fillet is a hollow face that goes on smoothly at this share of its border or more, up to this
 # angle. It is more hollow than it bulges. Its radius is less than this share of the part's size.
 SMOOTH_BORDER, SMOOTH_DEG, WIDE_FILLET = 0.5, 10.0, 0.2
+# A bevel turns from its neighbours by angles between these, at this share of its border or more. It
+# is narrower than a wide fillet.
+BEVEL_DEG, BEVEL_BORDER = (20.0, 70.0), 0.5
 
 
 def is_hole(vertices: np.ndarray, triangles: np.ndarray) -> bool:
@@ -126,6 +129,37 @@ def find_fillets(
     found = (bent > least_curvature(vertices)) & (bent * width > least_bend)
     found &= across < bowl * bent
     return likely[found], bent[found]
+
+
+def find_bevels(faces: Faces, vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the numbers of the faces that bevel a hollow corner, as a fillet weld does, (k,).
+
+    They meet their neighbours, which are no bevels, in hollow edges. The sides of a hexagon socket
+    and the facets of a coarse fillet are none.
+
+    Args:
+        faces: of the surface, as its sharp edges part them.
+        vertices, triangles: of the surface [m], (n, 3) and (m, 3).
+    """
+    normals = unit_vectors(area_vectors(vertices, triangles))
+    one, two = side_pairs(triangles).T  # a side begins at its corner, the other one ends there
+    of, beyond = faces.of_triangle[one // 3], faces.of_triangle[two // 3]
+    corners = vertices[triangles]
+    along = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 3)[one]
+    long = np.linalg.norm(along, axis=1) * (of != beyond)
+    first, second = normals[one // 3], normals[two // 3]
+    turn = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", first, second), -1.0, 1.0)))
+    is_hollow = np.einsum("ij,ij->i", np.cross(first, second), along) < 0.0
+    bevelled = is_hollow & (BEVEL_DEG[0] < turn) & (turn < BEVEL_DEG[1]) & (long > 0.0)
+    border, hollow = (
+        np.bincount(of, x, faces.count) + np.bincount(beyond, x, faces.count)
+        for x in (long, long * bevelled)
+    )
+    widest = WIDE_FILLET * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    is_bevel = (hollow >= BEVEL_BORDER * border) & (2.0 * faces.area < widest * hollow)
+    beside = bevelled & is_bevel[of] & is_bevel[beyond]
+    is_bevel[of[beside]] = is_bevel[beyond[beside]] = False
+    return np.flatnonzero(is_bevel)
 
 
 def least_curvature(vertices: np.ndarray) -> float:

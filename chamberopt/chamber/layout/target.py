@@ -16,7 +16,13 @@ import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
-from chamberopt.geometry.face_shapes import PATTERN, is_inside_of_tube, is_ring, teeth_of
+from chamberopt.geometry.face_shapes import (
+    PATTERN,
+    find_bevels,
+    is_inside_of_tube,
+    is_ring,
+    teeth_of,
+)
 from chamberopt.geometry.meshes.part_mesh import PartMesh, select_triangles
 from chamberopt.geometry.smoothing.fillets import faces_of, fillets_of
 from chamberopt.geometry.triangles import areas, border_edges, centre_of_mass
@@ -61,6 +67,7 @@ COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 
 BY_PROGRAM = re.compile(r"(?:created|exported|generated|written)[\s_-]+(?:by|from|with)\b", re.I)
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
 FACE = re.compile(r"face (\d+)", re.I)
+FLAT_DEG = 5.0  # largest angle in a face that is flat
 AROUND = 0.1  # share of the fillets' area from which on a face is one in which they lie
 SAME_RADIUS = 0.05  # relative difference of radii below which fillets are of one radius
 MOST_NAMED = 5  # surfaces of a target that are named; of more, the first are
@@ -80,6 +87,7 @@ class Surface:
     text: str  # description in a few words
     colour: str = ""  # colour of just these triangles in the file
     alone: str = ""  # names of each of its faces, and where they look, if they are few
+    raises_stress: bool = False  # whether such a form raises stress, as fillets and welds do
 
 
 @dataclass(frozen=True)
@@ -96,9 +104,10 @@ class Target:
 def surfaces(mesh: PartMesh) -> list[Surface]:
     """Return all surfaces that the target can be chosen from.
 
-    First are the surfaces that the file names, then fillets and faces, each the largest first.
+    First are the surfaces that the file names, then fillets, bevels and faces, each the largest
+    first.
     """
-    return [*named_surfaces(mesh), *_fillets(mesh), *_faces(mesh)]
+    return [*named_surfaces(mesh), *_fillets(mesh), *_bevels(mesh), *_faces(mesh)]
 
 
 def named_surfaces(mesh: PartMesh) -> list[Surface]:
@@ -168,8 +177,8 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
     if special:
         special.sort(key=lambda one: SELDOM.search(one.name) is not None)
         return _joined(special[:1], by_size("the largest surface that the file names", special[1:]))
-    fillets = [one for one in faces if {"cad_face", "fillet"}.intersection(one.keys["faces"][0])]
-    faces = [one for one in faces if one not in fillets]
+    fillets = [one for one in faces if one.raises_stress]
+    faces = [one for one in faces if not one.raises_stress]
     repeated = [one for one in faces if one.keys["faces"][0].get("alike")]
     counts = {one.name: _count(one) for one in repeated}
     features = [
@@ -201,12 +210,18 @@ def propose_target(mesh: PartMesh, known: Sequence[Surface], wanted: Iterable[st
         return replace(_joined(fillets, text), fillets=tuple(fillets))
     sizes = [area[one.triangles].sum() for one in faces]
     large = [one for one, size in zip(faces, sizes, strict=True) if size >= AS_LARGE * sizes[0]]
+    # Beside the sides of a blade, those of its root are as large, but flat.
     large = [
         one
         for one in large
-        if one is large[0] or not is_inside_of_tube(mesh.vertices, own[one.triangles])
+        if one is large[0]
+        or (
+            not is_inside_of_tube(mesh.vertices, own[one.triangles])
+            and (not _is_flat(mesh, one) or _is_flat(mesh, large[0]))
+        )
     ]
-    return _joined(large, by_size("the largest between sharp edges", faces[len(large) :]))
+    others = [one for one in faces if one not in large]
+    return _joined(large, by_size("the largest between sharp edges", others))
 
 
 def _around(fillets: Sequence[Surface], faces: Sequence[Surface], area: np.ndarray) -> str:
@@ -267,6 +282,12 @@ def _stand_in_ring(mesh: PartMesh, alike: Surface) -> bool:
     return is_ring(mesh.faces(crease_deg(mesh)), mesh.vertices, mesh.triangles, alike.triangles)
 
 
+def _is_flat(mesh: PartMesh, one: Surface) -> bool:
+    """Return whether the faces of a surface are flat."""
+    faces = mesh.faces(crease_deg(mesh))
+    return bool(faces.are_flat(FLAT_DEG)[faces.of_triangle[one.triangles]].all())
+
+
 def _faces(mesh: PartMesh) -> list[Surface]:
     """Return the faces between sharp edges, the largest first, as surfaces.
 
@@ -318,8 +339,23 @@ def _fillets(mesh: PartMesh) -> list[Surface]:
         keys = [{"at_mm": faces.place_mm(int(k)), own_key: True} for k in own]
         count = f"{len(own)} faces, " if len(own) > 1 else ""
         name, marked = f"fillets of {1e3 / widest:.3g} mm", np.isin(faces.of_triangle, own)
-        found.append((area, Surface(name, {"faces": keys}, marked, count + area_in_mm2(area))))
+        text = count + area_in_mm2(area)
+        found.append((area, Surface(name, {"faces": keys}, marked, text, raises_stress=True)))
     return [one for _, one in sorted(found, key=lambda pair: -pair[0])]
+
+
+def _bevels(mesh: PartMesh) -> list[Surface]:
+    """Return the bevels in hollow corners of a part, such as fillet welds, as one surface."""
+    crease = crease_deg(mesh)
+    faces = mesh.faces(crease)
+    own = find_bevels(faces, mesh.vertices, mesh.triangles)
+    if not len(own):
+        return []
+    keys = [{"at_mm": faces.place_mm(int(k)), "crease_deg": crease} for k in own]
+    count = f"{len(own)} faces, " if len(own) > 1 else ""
+    text = f"{count}{area_in_mm2(float(faces.area[own].sum()))}, in hollow corners, as fillet welds"
+    marked = np.isin(faces.of_triangle, own)
+    return [Surface("bevels", {"faces": keys}, marked, text, raises_stress=True)]
 
 
 def _single(mesh: PartMesh, of: Surface, number: int) -> Surface | None:

@@ -52,7 +52,9 @@ LEAST_LEFT, MOST_LEFT = 0.005, 0.15  # share of the target that is left out if n
 NARROW = 2.0  # ball diameters: the radius of hollows that balls hardly touch, at most
 MOSTLY, WHOLE = 0.5, 0.9  # share of what is left out, and of the target that names nothing of it
 NO_PLACE = (
-    "no flat face beside the target looks up or aside and has room for a holder",
+    "no flat face beside the target looks up or aside and has room for a holder: take a target "
+    "that leaves an end, a bore or such a face free (--target), or give a holder by hand "
+    "([holder])",
     "all of it is to be peened; leave out of [part.target] the face to hold it by",
 )
 

@@ -17,6 +17,7 @@ from chamberopt.chamber.layout.target import (
     propose_target,
     surfaces,
 )
+from chamberopt.geometry.meshes.part_mesh import PartMesh
 from tests.chamberopt.chamber.layout.test_arbor import drum, part_of
 
 FLUTES = 1300
@@ -181,3 +182,49 @@ def test_the_surfaces_in_which_fillets_lie_are_named(wide: float, is_told: bool)
     assert words.endswith('--target "face 2" --target "face 3"') == is_told
     assert "face 1" not in words
     assert is_told or not words
+
+
+@pytest.mark.parametrize(("wide", "count"), [(7.0, 2), (0.0, 0), (30.0, 0)])
+def test_the_welds_of_a_joint_are_chosen(wide: float, count: int) -> None:
+    """Two bevels at 45 degrees in the corners of a T, 60 mm long; too wide ones are none."""
+    half = [[0, 0], [60, 0], [60, 10], [5 + wide, 10], [5, 10 + wide], [5, 60], [0, 60]]
+    outline = CrossSection([np.array(half, dtype=float)])
+    joint = outline + outline.mirror((1.0, 0.0))
+    mesh, body = part_of(Manifold.extrude(joint, 60.0))
+    known = surfaces(mesh)
+    welds = [one for one in known if one.name == "bevels"]
+    assert len(welds) == (count > 0)
+    if welds:
+        target = propose_target(mesh, known, [])
+        assert (target.triangles == welds[0].triangles).all()
+        assert target.reason.endswith(BY_SHAPE)
+        area = body.area_faces[target.triangles].sum()
+        assert area == pytest.approx(count * 60.0 * wide * np.sqrt(2.0))
+        asked = select_triangles_of(mesh, welds[0])
+        assert (asked == target.triangles).all()
+
+
+def select_triangles_of(mesh: PartMesh, one: Surface) -> np.ndarray:
+    """Mark the triangles that the keys of a surface choose by their places, (m,)."""
+    faces = mesh.faces(one.keys["faces"][0]["crease_deg"])
+    numbers = [faces.at(1e-3 * np.array(key["at_mm"]))[0] for key in one.keys["faces"]]
+    return np.isin(faces.of_triangle, numbers)
+
+
+def test_the_sides_of_a_socket_are_no_bevels() -> None:
+    """Each side of a hexagon meets two others in hollow edges that turn by 60 degrees."""
+    mesh, _ = part_of(drum(20, 10) - Manifold.cylinder(5.0, 8.0, 8.0, 6).translate([0, 0, 5]))
+    assert not [one for one in surfaces(mesh) if one.raises_stress]
+
+
+def test_flat_sides_of_a_root_are_not_peened_with_those_of_a_blade() -> None:
+    """The round back of a blade is 2 % larger than the two flat sides of its root."""
+    angle = np.linspace(0.0, np.pi, 60)
+    back = np.column_stack([10.0 * np.cos(angle), 10.0 * np.sin(angle)])
+    blade = Manifold.extrude(CrossSection([back]), 40.0)
+    size = 40.0 * 10.0 * np.pi / 1.02 / 2.0
+    root = Manifold.cube((20.0, 5.0, size / 20.0)).translate([-10.0, 1.0, -size / 20.0])
+    mesh, body = part_of(blade + root)
+    target = propose_target(mesh, surfaces(mesh), [])
+    assert target.reason.startswith("face 1: the largest")
+    assert body.triangles_center[target.triangles, 2].min() > 0.0
