@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.chamber.checks.fillets import OF_FILLET, OF_SLOT
 from chamberopt.chamber.layout.target import area_in_mm2
-from chamberopt.chamber.propose.first_design import START
+from chamberopt.chamber.propose.placed_proposal import START
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.text import TO_SETTLE, clauses, to_settle
 from chamberopt.common.errors import one_line
