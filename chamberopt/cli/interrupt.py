@@ -1,4 +1,7 @@
-"""Handle Ctrl-C: it ends a command at once, and a study after its running evaluations."""
+"""Handle Ctrl-C: it ends a command at once, and a study after its running evaluations.
+
+A simulation is ended with a result of what has ended by then.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Self
@@ -15,11 +18,13 @@ INTERRUPTED = "interrupted"
 FIRST = "finishing what runs, then stopping; press Ctrl-C again to stop now"
 SECOND = "stopped; the running evaluations are lost, all earlier ones are on disk"
 EARLY = "interrupted; no evaluation was running"
+KEEPING = "keeping what is simulated by now, then stopping; press Ctrl-C again to stop now"
 SHOW_CURSOR = "\033[?25h"  # a progress bar hides it
 
 
 # An exception that is raised inside this code is lost, or leaves a module half imported.
 IMPORTS, COMPILERS = "<frozen importlib", ("numba", "llvmlite")
+_requested = False  # whether Ctrl-C was pressed since the command began
 
 
 @contextmanager
@@ -31,14 +36,15 @@ def interruptible() -> Iterator[None]:
     is damaged, because files get their names when they are complete. Threads that simulate end with
     the process.
     """
-    requested = False
+    global _requested
+    _requested = False
 
     def on_signal(number: int, frame: FrameType | None) -> None:
-        nonlocal requested
-        if requested or _would_be_lost(frame):
+        global _requested
+        if _requested or _would_be_lost(frame):
             _write(INTERRUPTED)
             os._exit(130)
-        requested = True
+        _requested = True
         raise KeyboardInterrupt
 
     if threading.current_thread() is not threading.main_thread():
@@ -51,9 +57,40 @@ def interruptible() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-    if requested:
+    if _requested:
         sys.stdout.flush()
         os._exit(130)
+
+
+def is_requested() -> bool:
+    """Return whether Ctrl-C was pressed since the command began."""
+    return _requested
+
+
+@contextmanager
+def first_only_asks() -> Iterator[Callable[[], bool]]:
+    """Let the first Ctrl-C in the block ask to stop and keep what is done; a second ends at once.
+
+    Yields the function that tells whether it was pressed.
+    """
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        global _requested
+        if _requested:
+            _write(INTERRUPTED)
+            os._exit(130)
+        _requested = True
+        _write(KEEPING)
+
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or before is signal.SIG_IGN:
+        yield is_requested
+        return
+    signal.signal(signal.SIGINT, on_signal)
+    try:
+        yield is_requested
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def ignore_late_ctrl_c() -> None:

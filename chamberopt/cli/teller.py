@@ -6,8 +6,9 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from chamberopt.cli.console import print_remarks, print_warnings
+from chamberopt.cli.interrupt import first_only_asks
 from chamberopt.cli.prepare import compile_with_message
-from chamberopt.common.progress import step
+from chamberopt.common.progress import StoppedError, step
 from chamberopt.workflows.optimise import CANDIDATES
 from chamberopt.workflows.simulate import StepTeller
 
@@ -32,6 +33,21 @@ class TerminalTeller(StepTeller):
 
     def tell(self, text: str) -> None:
         print_remarks([text])
+
+
+class SimulationTeller(TerminalTeller):
+    """Show a simulation on stderr. On Ctrl-C, it is ended with what is simulated by then."""
+
+    @contextmanager
+    def stoppable(self, progress: Progress) -> Iterator[Progress]:
+        with first_only_asks() as is_asked:
+
+            def tell(done: float, total: int, best: float | None) -> None:
+                if is_asked():
+                    raise StoppedError
+                progress(done, total, best)
+
+            yield tell
 
 
 class SearchTeller(TerminalTeller):

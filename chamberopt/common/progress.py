@@ -33,6 +33,10 @@ _displays: list[Display] = []
 _counted = 0  # steps that run now and told a total at their beginning
 
 
+class StoppedError(Exception):
+    """Raised by a function of type Progress, to end a step that the user has stopped."""
+
+
 def write_json_lines() -> None:
     """Make all later steps write their progress as lines of JSON."""
     global _json_lines

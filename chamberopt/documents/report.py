@@ -75,6 +75,7 @@ STOP_REASONS = {
     "accuracy": "the requested accuracy was reached",
     "max_replicas": "the largest allowed number; the requested accuracy was not reached",
     "points": "more would bring nothing: the error is in the choice of the windows' points",
+    "user": "the simulation was stopped by the user",
 }
 ENDS = {  # by the reasons in search/optimiser/point_search.py
     "budget": "as its evaluations were spent",

@@ -15,6 +15,7 @@ from typing import IO, Any
 
 from chamberopt.common.child import GRACE_S, start_python
 from chamberopt.common.errors import InputError
+from chamberopt.common.files import RESULT
 from chamberopt.page.page_words import at_keys, on_page
 
 WARNING = "warning: "  # begins a line
@@ -30,7 +31,7 @@ class StartedCommand:
     """A chamberopt command that runs in a folder, and the lines that it has printed so far."""
 
     def __init__(self, arguments: Sequence[str], folder: Path, result: str = "") -> None:
-        self.arguments, self._result = list(arguments), result
+        self.arguments, self._folder, self._result = list(arguments), folder, result
         self._lines: list[str] = []
         self._answer: list[str] = []  # lines of JSON, of a command that was asked for JSON
         self._steps: dict[str, dict[str, Any]] = {}
@@ -61,7 +62,8 @@ class StartedCommand:
         """Return what the page shows of the command: printed lines and progress of its steps.
 
         The value `exit` is the exit status of the command, or None while it runs. `result` is the
-        folder of the result that it will leave, if any. `printed` are its lines in the words of the
+        folder of the result that it will leave, if any, and `kept` whether it has left it: also a
+        simulation that was stopped may. `printed` are its lines in the words of the
         page, as its warnings are; `fault` are those where it failed, and `at` has what the last of
         them says of an option. `answer` is what a command that was asked for JSON has answered, or
         None. `draft` is a proposal before its pilots, while the command runs.
@@ -76,6 +78,7 @@ class StartedCommand:
         return {
             "command": f"chamberopt {' '.join(self.arguments)}",
             "result": self._result,
+            "kept": code is not None and (self._folder / self._result / RESULT).is_file(),
             "seconds": round(time.monotonic() - self._began),
             "steps": [] if code is not None else list(self._steps.values()),
             "lines": lines,

@@ -33,9 +33,10 @@ MIN_REPLICAS_TO_STOP = 10
 MIN_GROWTH, MAX_GROWTH = 1.25, 2.0
 MIN_GROWTH_OF_DENTS = 1.05  # while a figure has no interval, there is none to be lucky with
 
-Reason = Literal["replicas", "accuracy", "max_replicas", "points"]
+Reason = Literal["replicas", "accuracy", "max_replicas", "points", "user"]
 """Why a simulation ended: its number of replicas was given; the wanted accuracy was reached; the
-largest number was; or more replicas bring nothing, as the error is in the choice of the points."""
+largest number was; more replicas bring nothing, as the error is in the choice of the points; or the
+user stopped it."""
 
 
 def narrows(figure: Estimate) -> bool:

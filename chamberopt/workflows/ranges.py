@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.progress import StoppedError
 from chamberopt.design.ranges import unknowns
 from chamberopt.documents.ranges import cost_text
 from chamberopt.peening.range_result import RangeResult, StudyRanges
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from chamberopt.simulation.evaluation import Evaluation
     from chamberopt.workflows.simulate import Teller
 
+STOPPED = "stopped by the user: how far figures may be off before a calibration is not simulated"
 ENDS = "replicas at the ends of what is not calibrated"
 
 
@@ -45,7 +47,7 @@ def simulate_ranges(
 ) -> RangeResult | None:
     """Return the ranges of a design's figures; None if all of its numbers are known or calibrated.
 
-    Raises EndError if an end cannot be simulated.
+    Raises EndError if an end cannot be simulated, or the user stops before all are.
 
     Args:
         found: evaluation of the design.
@@ -56,9 +58,12 @@ def simulate_ranges(
         return None
     count = replicas_at_ends(found.replicas, len(groups))
     teller.tell(cost_text([one.name for one in groups], count, found.replicas))
-    with teller.step(step, 2 * len(groups) * count) as progress:
-        runs = _simulated(design, chamber, found, executor, progress, count)
-        return find_ranges(runs)
+    total = 2 * len(groups) * count
+    with teller.step(step, total) as progress, teller.stoppable(progress) as tell:
+        try:
+            return find_ranges(_simulated(design, chamber, found, executor, tell, count))
+        except StoppedError:
+            raise EndError(STOPPED) from None
 
 
 def study_ranges(result: StudyResult, executor: Executor, teller: Teller) -> StudyRanges | None:

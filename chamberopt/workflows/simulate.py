@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.chamber.analytic import analytic_cavity
 from chamberopt.chamber.build import build_chamber
-from chamberopt.common.progress import step, untold
+from chamberopt.common.progress import StoppedError, step, untold
 from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes, how_many_fit
 from chamberopt.design.ranges import unknowns, variants
 from chamberopt.peening.calibration_errors import evaluate_calibrated
@@ -21,7 +21,8 @@ from chamberopt.peening.range_result import Spreads
 from chamberopt.peening.tolerances import simulate_tolerances, with_usual_tolerances
 from chamberopt.simulation.effect_pilot import with_effects_resolved
 from chamberopt.simulation.effort import Effort
-from chamberopt.simulation.evaluate import ReplicaPlan
+from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
+from chamberopt.simulation.replicas import ReplicaSet
 from chamberopt.workflows.compile import compile_for
 from chamberopt.workflows.ranges import ENDS, EndError, simulate_ranges
 from chamberopt.workflows.save_run import save_simulation
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     from chamberopt.simulation.advice import Advice
     from chamberopt.simulation.evaluation import Evaluation
     from sim_core import AnalyticCavity
+
+LEAST = 3  # replicas that give an interval
 
 
 class Teller:
@@ -60,6 +63,14 @@ class Teller:
         if self._progress is None or total is None:
             return nullcontext(untold)
         return nullcontext(self._progress)
+
+    def stoppable(self, progress: Progress) -> AbstractContextManager[Progress]:
+        """Return a `with` context in which the user may stop, and keep what is simulated by then.
+
+        The context yields what to call in the place of `progress`, which then raises StoppedError.
+        With this class nobody stops.
+        """
+        return nullcontext(progress)
 
     def compile(self, design: Design, chamber: Chamber, cavity: AnalyticCavity | None) -> None:
         """Compile the simulator before the first replica.
@@ -183,8 +194,8 @@ def simulate_design(
         if settings.tolerances:
             evaluation, found = simulate_tolerances(*what, settings.analytic)
         else:
-            evaluation = evaluate_calibrated(*what, settings.plan, cavity)
-    if settings.ranges:
+            evaluation = _evaluated(*what, settings.plan, cavity, teller)
+    if settings.ranges and evaluation.stopped_by != "user":
         try:
             ranges = simulate_ranges(design, chamber, evaluation, executor, teller, then)
         except EndError as error:
@@ -193,6 +204,43 @@ def simulate_design(
     with teller.step(last):
         saved = save_simulation(folder, design, chamber, evaluation, advice, warnings, spreads)
     return Simulated(design, chamber, evaluation, spreads, advice, *saved)
+
+
+def _evaluated(
+    design: Design,
+    chamber: Chamber,
+    executor: Executor,
+    progress: Progress,
+    plan: ReplicaPlan,
+    cavity: AnalyticCavity | None,
+    teller: Teller,
+) -> Evaluation:
+    """Return the evaluation of a design by its replicas, or by those that end before a stop.
+
+    With a calibration, intervals take all of its runs: nothing can be kept before.
+
+    Raises KeyboardInterrupt if too few have ended before a stop.
+    """
+    what = design, chamber, executor
+    if design.calibration is not None:
+        return evaluate_calibrated(*what, progress, plan, cavity)
+    known = ReplicaSet()
+    try:
+        with teller.stoppable(progress) as tell:
+            return evaluate(*what, tell, plan, cavity, known)
+    except StoppedError:
+        done = len(known.replicas)
+    if done < LEAST:
+        error = KeyboardInterrupt()
+        error.add_note(f"nothing is kept: {done} replicas had ended, and {LEAST} give an interval")
+        raise error
+    found = evaluate(*what, None, replace(plan, count=done), cavity, known)
+    most = Effort.of(design.process.accuracy, plan.count).most
+    note = (
+        f"stopped by the user after {done} of {most} replicas: intervals are wider than those of "
+        "all, and how far figures may be off before a calibration was not simulated"
+    )
+    return replace(found, stopped_by="user", notes=(note, *found.notes))
 
 
 def resolve_effects(

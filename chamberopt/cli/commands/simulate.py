@@ -36,6 +36,9 @@ def simulate(
 ) -> None:
     """Simulate one design and predict its coverage, with confidence intervals and pictures.
 
+    Ctrl-C ends it with a result of the replicas that have ended by then; a second Ctrl-C stops at
+    once. Of a design with a calibration nothing is kept before all replicas have ended.
+
     Parameters
     ----------
     design
@@ -49,7 +52,8 @@ def simulate(
         Also simulate the ends of what is not calibrated (friction, v0, slopes of faces), in as many
         replicas again, and say how far the figures may be off by it.
     """
-    from chamberopt.cli.teller import TerminalTeller
+    from chamberopt.cli.interrupt import is_requested
+    from chamberopt.cli.teller import SimulationTeller
     from chamberopt.common.executor import open_executor
     from chamberopt.design.load import load_design
     from chamberopt.design.tolerances import USUAL_IN_WORDS
@@ -72,6 +76,8 @@ def simulate(
         open_executor(workers, cluster) as executor,
     ):
         settings = SimulationSettings(analytic, tolerances, ranges)
-        done = simulate_design(candidate, folder, executor, TerminalTeller(), settings)
-    console.print_remarks(done.remarks)
-    console.print_result(result_end(folder, verbose), folder, json)
+        done = simulate_design(candidate, folder, executor, SimulationTeller(), settings)
+        console.print_remarks(done.remarks)
+        console.print_result(result_end(folder, verbose), folder, json)
+        if is_requested():
+            raise KeyboardInterrupt  # what still runs is not waited for

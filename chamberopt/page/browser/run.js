@@ -115,9 +115,9 @@ document.addEventListener("varied", showVaried);
 
 // Follow a command to its end, and tell what it has left.
 export async function followToEnd(started) {
-  const exit = await follow(started);
+  const { result, kept } = await follow(started);
   tellDuration();
-  tell("ended", exit === 0 ? started.result : "");
+  tell("ended", kept ? result : "");
 }
 const tell = (name, detail) => document.dispatchEvent(new CustomEvent(name, { detail }));
 
@@ -125,19 +125,27 @@ const tell = (name, detail) => document.dispatchEvent(new CustomEvent(name, { de
 export const running = () => study;
 let study = "";
 
-// Show a command that runs, by default what the server has started last, and give its exit status.
-export const follow = async (started) => (await followed(show, started))?.exit ?? null;
+// Show a command that runs, by default what the server has started last, and give its last status; {} if there is none.
+export const follow = async (started) => await followed(show, started) ?? {};
 
-function show({ command, result, steps, seconds, printed, exit }) {
+// What a command keeps that is stopped, said before it is, and afterwards.
+const KEEPS = { simulate: ["ends it with a result of the replicas that have ended by then, three at least, with wider intervals. With a calibration all must have ended.", "stopped; nothing is kept"],
+  run: ["ends it after the chambers that are simulated now. What is tried is kept, and Resume goes on.", "stopped; what was tried is kept"],
+  sweep: ["ends it at once. What is tried is kept, and the command that is then said goes on in a terminal.", "stopped; what was tried is kept"] };
+const keeps = (command) => KEEPS[command.split(" ")[1]] ?? ["", "stopped"];
+
+function show({ command, result, kept, steps, seconds, printed, exit }) {
   if (exit !== null && command.startsWith("chamberopt new ")) return; // of the front page
   const before = study;
   study = exit === null && isStudy(command) ? result : "";
   if (study && study !== before) tell("study", study);
-  find("stop").disabled = exit !== null;
+  find("stop").disabled = exit !== null || isStopping;
+  find("stop-keeps").textContent = exit !== null ? "" : isStopping ? "stopping …" : `Stop ${keeps(command)[0]}`;
+  isStopping &&= exit === null;
   isRunning = exit === null;
   allow();
-  const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? "stopped" : `ended with exit status ${exit}`;
-  find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...toResult(command, result, exit));
+  const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? kept ? "stopped; what was simulated until then is a result" : keeps(command)[1] : `ended with exit status ${exit}`;
+  find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...toResult(command, result, exit, kept));
   find("study-progress").replaceChildren(...(study ? [...find("progress").children].map((one) => one.cloneNode(true)) : [])); // which is in its place
   find("printed").replaceChildren(...asLines(printed));
   find("printed-fold").hidden = !printed.length;
@@ -145,14 +153,14 @@ function show({ command, result, steps, seconds, printed, exit }) {
 }
 
 // A page that was loaded anew meanwhile has not shown what the command has found.
-function toResult(command, result, exit) {
+function toResult(command, result, exit, kept) {
   if (!result || exit === null) return [];
   const button = (textContent, act) => {
     const made = element("button", { type: "button", textContent, title: result });
     made.addEventListener("click", act);
     return made;
   };
-  return [...(exit === 0 ? [button("Show the result", () => tell("result", result)), " "] : []),
+  return [...(kept ? [button("Show the result", () => tell("result", result)), " "] : []),
     ...(isStudy(command) ? [button("See its candidates", () => tell("study", result))] : [])];
 }
 const isStudy = (command) => command.startsWith("chamberopt run ");
@@ -174,7 +182,13 @@ find("more-of").addEventListener("click", () => attempt(async () => {
   await read(); // the further study is a file of its own
   await followToEnd(started);
 }, find("run-fault")));
-find("stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
+// A second stop would lose what the first keeps.
+let isStopping = false;
+find("stop").addEventListener("click", () => attempt(async () => {
+  isStopping = find("stop").disabled = true;
+  find("stop-keeps").textContent = "stopping …";
+  await ask("/stop", {});
+}));
 // What was refused is no longer said once something else is asked.
 const unsay = () => { find("run-fault").textContent = find("search-fault").textContent = ""; };
 find("run").addEventListener("input", unsay);

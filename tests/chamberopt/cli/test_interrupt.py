@@ -1,6 +1,8 @@
 """Ctrl-C at any moment of any command ends it, from the first line of the program that runs."""
 
+import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -10,6 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from chamberopt.chamber.build import build_chamber
+from chamberopt.common.executor import SerialExecutor
+from chamberopt.results.load import load_result
+from chamberopt.simulation.evaluate import evaluate
 from tests.hunt.base import write_base
 
 ROOT = Path(__file__).parents[3]
@@ -86,3 +92,35 @@ def test_ctrl_c_after_the_command_changes_nothing(place: Path) -> None:
         check=False,
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs signals")
+def test_ctrl_c_keeps_the_replicas_that_have_ended(place: Path) -> None:
+    """Simulated again with as many replicas, the design has the same figures."""
+    design = (place / "design.toml").read_text()
+    (place / "long.toml").write_text(re.sub(r"(?m)^replicas *=.*", "replicas = 999", design))
+    going = subprocess.Popen(
+        [sys.executable, "-m", "chamberopt", "simulate", "long.toml", "--out", "stopped",
+         "--workers", "2", "--progress", "jsonl"],
+        cwd=place,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )  # fmt: skip
+    assert going.stderr is not None
+    steps = (json.loads(line) for line in going.stderr if line.startswith('{"step"'))
+    next(one for one in steps if one.get("total") == 999 and one["done"] >= 3)
+    going.send_signal(signal.SIGINT)
+    told, message = going.communicate(timeout=60)
+    assert going.returncode == 130, message
+    result = load_result(place / "stopped")
+    replicas = result.record.replicas
+    assert 3 <= replicas < 999
+    assert result.record.stopped_by == "user"
+    assert f"stopped by the user after {replicas} of 999 replicas" in result.record.notes[0]
+    assert "98 %" in told
+    again = result.design.changed({"process.accuracy.replicas": replicas})
+    figures = evaluate(again, build_chamber(again), SerialExecutor()).metrics
+    name = "mean_coverage"
+    assert figures[name].value == result.record.metrics[name].value
