@@ -7,6 +7,7 @@ all other clauses stand beside the values.
 
 from __future__ import annotations
 
+import math
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,6 +18,7 @@ from chamberopt.chamber.checks.fillets import OF_FILLET, OF_SLOT
 from chamberopt.chamber.layout.target import area_in_mm2
 from chamberopt.chamber.propose.placed_proposal import START
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
+from chamberopt.chamber.propose.quicker import TRIED
 from chamberopt.chamber.propose.text import TO_SETTLE, clauses, to_settle
 from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import in_words
@@ -28,7 +30,7 @@ from chamberopt.peening.strip_holder import target_level_mm, why_no_strip
 
 if TYPE_CHECKING:
     from chamberopt.chamber.layout.target import Surface
-    from chamberopt.chamber.propose.proposal import Proposal
+    from chamberopt.chamber.propose.proposal import BallTrial, PoseTrial, Proposal
     from chamberopt.chamber.propose.proposed_mask import LeftOut
 
 WIDTH, INDENT = 79, 13  # columns
@@ -93,11 +95,13 @@ class ProposalInWords:
         rows: the proposed values with their reasons, in the order in which a shop asks.
         matters: what is to be settled before it is built.
         choices: surfaces to choose a target from.
+        poses: poses, the quickest first, where pilots compared them.
         trials: balls of several sizes, where pilots compared them.
     """
 
     sentence: str
     rows: tuple[Row, ...]
+    poses: Table | None
     trials: Table | None
     matters: tuple[Matter, ...]
     choices: tuple[Choice, ...]
@@ -115,6 +119,7 @@ def proposal_in_words(made: Proposal, left_out: Sequence[LeftOut]) -> ProposalIn
         for key in keys:
             reason = one_line(made.reasons.get(key, ""))  # its beginning may be the row's value
             why, _ = clauses(re.sub(f"^{re.escape(value)}[:;] ", "", reason))
+            why = [one for one in why if not (made.poses and one.startswith(TRIED))]
             if why and why != [value]:
                 of = f"{in_words(key.rpartition('.')[2])}: " if key.endswith("_mm") else ""
                 reasons.append(f"{of}{'; '.join(why)}")
@@ -123,6 +128,7 @@ def proposal_in_words(made: Proposal, left_out: Sequence[LeftOut]) -> ProposalIn
     return ProposalInWords(
         _sentence(made),
         tuple(rows),
+        _poses(made) if made.poses else None,
         _trials(made) if made.trials else None,
         tuple(matter_of(text) for text in to_settle(made, left_out)),
         tuple(_choice(_as_simulated(one, made), one.name == target) for one in made.known),
@@ -141,8 +147,8 @@ def proposal_lines(told: ProposalInWords, verbose: bool) -> list[Table | str]:
             lines += wrapped(f"{row.name:{INDENT}}{row.value}", INDENT)
             for reason in row.reasons:
                 lines += wrapped(f"{'':{INDENT}}{reason}", INDENT)
-    if told.trials is not None:
-        lines += ["", *wrapped(f"{told.trials.caption}:", 0), told.trials]
+    for table in filter(None, (told.poses, told.trials)):
+        lines += ["", *wrapped(f"{table.caption}:", 0), table]
     if told.matters:
         lines += ["", "To be settled before it is built:"]
         for number, matter in enumerate(told.matters, 1):
@@ -325,6 +331,29 @@ def _balls(made: Proposal) -> Iterator[str]:
             yield f"{one.shot.count:,} balls of {size:g} mm ({material}, {1e3 * one.shot.mass:g} g)"
 
 
+def _poses(made: Proposal) -> Table:
+    """Return a table of the poses that pilots compared, the quickest first."""
+    several = any(one.sonotrode_count > 1 for one in made.poses)
+    turns = any(one.settings > 1 for one in made.poses)
+    head = ["pose", "98 % after", "intensity", "sonotrodes"][: 3 + several]
+    head += ["settings"] * turns + ["what became of it"]
+    rows = []
+    for one in sorted(made.poses, key=lambda one: (one.time_to_98 or math.inf) * one.settings):
+        strong = f"{plain(one.intensity.value, 2)} mmA" if one.intensity else "not known"
+        row = [one.pose, _after(one), strong]
+        row += [str(one.sonotrode_count)] * several + [str(one.settings)] * turns
+        rows.append([*row, one.outcome])
+    text = "Poses that pilots compared, before balls and amplitude were chosen"
+    return Table(text, head, rows, numbers=False)
+
+
+def _after(one: BallTrial | PoseTrial) -> str:
+    """Return in words after which time the target is covered by a pilot."""
+    if not one.time_to_98:
+        return "not known"
+    return f"{rounded(one.time_to_98, 2)} s" + " on average" * (not one.is_of_places)
+
+
 def _trials(made: Proposal) -> Table:
     """Return a table of the balls that pilots compared, one row a size."""
     taken = {round(1e3 * one.shot.diameter, 4) for one in made.design.in_steps.values()}
@@ -334,15 +363,13 @@ def _trials(made: Proposal) -> Table:
     rows = []
     for one in made.trials:
         known = one.intensity
-        after = f"{rounded(one.time_to_98, 2)} s" if one.time_to_98 else "not known"
-        after += "" if one.is_of_places or not one.time_to_98 else " on average"
         row = [
             f"{one.ball_mm:g} mm" + ", taken" * (one.ball_mm in taken),
             f"{one.fit.touched:.0%}",
             f"{one.fit.served:.0%}",
             f"{one.amplitude_um:g} µm",
             f"{plain(known.value, 2)} mmA" if known else "not known",
-            "not tried" if one.harm else after,
+            "not tried" if one.harm else _after(one),
             f"{one.count:,}",
         ]
         rows.append(row + [str(one.sonotrode_count)] * several)

@@ -253,6 +253,7 @@ def _on_page(answer: Any) -> dict[str, object] | None:
             for one in answer["matters"]
         ],
         "choices": answer["choices"],
+        "tables": [one for one in (answer["poses"], answer["trials"]) if one],
     }
 
 

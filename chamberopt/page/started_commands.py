@@ -35,6 +35,7 @@ class StartedCommand:
         self._lines: list[str] = []
         self._answer: list[str] = []  # lines of JSON, of a command that was asked for JSON
         self._steps: dict[str, dict[str, Any]] = {}
+        self._stage: dict[str, int] | None = None  # number of the present one, and their count
         self._draft: dict[str, Any] | None = None  # a proposal before its pilots
         self._began = time.monotonic()
         self._process = start_python(
@@ -66,7 +67,8 @@ class StartedCommand:
         simulation that was stopped may. `printed` are its lines in the words of the
         page, as its warnings are; `fault` are those where it failed, and `at` has what the last of
         them says of an option. `answer` is what a command that was asked for JSON has answered, or
-        None. `draft` is a proposal before its pilots, while the command runs.
+        None. `draft` is a proposal before its pilots, while the command runs, and `stage` the
+        number of its present stage and the count of all.
         """
         code = self._process.poll()
         if code is not None:
@@ -87,6 +89,7 @@ class StartedCommand:
             "fault": printed if code else [],
             "at": at_keys(lines[-1]) if code and lines else {},
             "exit": code,
+            "stage": self._stage,
             "draft": self._draft if code is None else None,
             "answer": json.loads("".join(self._answer)) if self._answer and code == 0 else None,
         }
@@ -121,6 +124,8 @@ class StartedCommand:
                 lines.append(line.rstrip("\n"))
             elif "draft" in told:
                 self._draft = told["draft"]
+            elif "stage" in told:
+                self._stage = told["stage"]
             elif told.get("ended"):
                 self._steps.pop(told["step"], None)
             else:
@@ -129,7 +134,7 @@ class StartedCommand:
 
 def _told(line: str) -> dict[str, Any] | None:
     """Return what a command prints for a program as a line of JSON, or None for other lines."""
-    if not line.startswith(('{"step"', '{"draft"')):
+    if not line.startswith(('{"step"', '{"draft"', '{"stage"')):
         return None
     try:
         return dict(json.loads(line))

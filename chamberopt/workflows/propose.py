@@ -47,7 +47,7 @@ from chamberopt.chamber.propose.text import design_text, study_texts
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import local_executor
 from chamberopt.common.files import claim_folder, remove_file, whole_or_nothing, write_text
-from chamberopt.common.progress import no_steps
+from chamberopt.common.progress import no_steps, tell_program
 from chamberopt.common.toml_fields import allowed_range
 from chamberopt.design.intensity import WantedIntensity
 from chamberopt.design.process import Process
@@ -148,8 +148,9 @@ def stages(teller: Teller, pilot: bool) -> Iterator[Begin]:
 
         def begin(stage: str) -> None:
             now.close()
-            number = order.index(stage) + 1
-            now.enter_context(teller.step(f"step {number} of {len(order)}: {stage}"))
+            number, count = order.index(stage) + 1, len(order)
+            tell_program("stage", lambda: {"number": number, "count": count})
+            now.enter_context(teller.step(f"step {number} of {count}: {stage}"))
 
         yield begin
 
@@ -273,6 +274,10 @@ class _Pilots:
         Raises InputError if an intensity that was asked for cannot be told.
         """
         now, wanted = self._chosen_way(first)
+        return replace(self._improved(now, wanted), poses=now.made.poses)
+
+    def _improved(self, now: Compared, wanted: Wanted) -> Proposal:
+        """Return a proposal for a chosen way, with balls, amplitude, times and budget by pilots."""
         by_geometry = setting_of(now.made).ball_mm
         sought = self._sought(now, wanted)
         if sought.asked:
@@ -306,7 +311,9 @@ class _Pilots:
             wanted = replace(wanted, may_leave_end=False, thick_pose=pose, without_fillets=fewer)
         way = Way(first, wanted, self._measure(first, is_brief=True))
         self.begin(WAYS)
-        made, wanted, found = propose_quicker(way, self._each, turned_over, self._briefly)
+        made, wanted, found = propose_quicker(
+            way, self._each, turned_over, self._briefly, self.teller.step
+        )
         now = Compared(*propose_second_pose(made, found, self._briefly))
         over = bool(now.made.design.steps)
         is_turned, leaves_end = turns(now.made), now.made.leaves_end
@@ -382,11 +389,13 @@ class _Pilots:
         settings = settings_beside(made, sought.wanted, sought.asked, found, by_geometry)
         wishes = [replace(sought.wanted, ball_mm=one.ball_mm) for one in settings]
         each = zip(self._each(wishes, now.made), settings, strict=True)
-        tried = [
-            self._compared(with_amplitude(_told(made, sought.reasons), one), now, sought, scale)
-            for made, one in each
-            if made is not None
-        ]
+        tried = []
+        with self.teller.step("sizes tried", len(settings)) as progress:
+            for k, (other, one) in enumerate(each):
+                progress(k, len(settings), None)
+                if other is not None:
+                    other = with_amplitude(_told(other, sought.reasons), one)
+                    tried.append(self._compared(other, now, sought, scale))
         return now, tried
 
     def _compared(self, made: Proposal, now: Compared, sought: _Sought, scale: float) -> Compared:

@@ -120,6 +120,26 @@ class BallTrial:
 
 
 @dataclass(frozen=True)
+class PoseTrial:
+    """What a pilot told of a target in one pose, in its own chamber.
+
+    Attributes:
+        pose: its name, in words.
+        sonotrode_count, settings: of sonotrodes side by side, and of the part one after the other.
+        time_to_98, is_of_places, intensity: as of a BallTrial.
+        outcome: "taken", or in words why it is not; "" if it is just slower.
+    """
+
+    pose: str
+    sonotrode_count: int
+    settings: int
+    time_to_98: float | None
+    is_of_places: bool
+    intensity: PredictedIntensity | None
+    outcome: str
+
+
+@dataclass(frozen=True)
 class Proposal:
     """A proposed design, the reason for each value, and the warnings of its check."""
 
@@ -151,6 +171,8 @@ class Proposal:
     usual: WantedIntensity | None = None
     # Balls of several sizes that pilots compared, the smallest first; none without a pilot.
     trials: tuple[BallTrial, ...] = ()
+    # Poses that pilots compared, in the order in which they were tried; none if one was quick.
+    poses: tuple[PoseTrial, ...] = ()
 
     @property
     def leaves_end(self) -> bool:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from itertools import product
 from typing import NamedTuple
@@ -22,10 +22,11 @@ from chamberopt.chamber.layout.balls import MOST_BALLS
 from chamberopt.chamber.layout.floor import SEVERAL
 from chamberopt.chamber.layout.pose import AT_SIDE, TURNING, Pose
 from chamberopt.chamber.propose.held_proposal import rests
-from chamberopt.chamber.propose.proposal import Proposal, Wanted, new_harm, with_charge
+from chamberopt.chamber.propose.proposal import PoseTrial, Proposal, Wanted, new_harm, with_charge
 from chamberopt.chamber.propose.proposed_budget import LONG, Measured, TooSlowError
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
+from chamberopt.common.progress import Progress, untold
 from chamberopt.geometry.triangles import rotation_matrix
 
 SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways are tried
@@ -34,6 +35,8 @@ SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways 
 QUICKER, AS_STRONG, HALF = 0.8, 0.8, 0.5
 POSES: tuple[Pose, ...] = (*AT_SIDE, TURNING)  # that are tried
 LAYER = 2.0  # over half a layer
+TRIED = "poses tried by pilots"  # begins the clause of a reason that tells all of them
+Counted = Callable[[str, int], AbstractContextManager[Progress]]
 SAME = 0.999  # cosine between the directions that point up, from which on a pose is no other one
 
 
@@ -50,6 +53,7 @@ def propose_quicker(
     again: Callable[[Sequence[Wanted]], Sequence[Proposal | None]],
     turned_over: Callable[[Proposal], Proposal],
     measure: Callable[[Proposal, float], Measured | None],
+    counted: Counted = lambda *_: nullcontext(untold),
 ) -> Way:
     """Return the way that is quickest by pilots, of those with no more faults than the first.
 
@@ -58,37 +62,12 @@ def propose_quicker(
         turned_over: adds a step in which the part is turned over.
         measure: simulates a proposal briefly; None if that cannot be done. Raises TooSlowError if
             the time to 98 % is longer than a given one [s].
+        counted: begins a step that counts what is tried.
     """
     best = first
-    tried: list[tuple[Way, str]] = []
     if _is_slow(first) and first.wanted.pose is None and not turns(first.made):
-        poses = dict(
-            zip(POSES, again([replace(first.wanted, pose=one) for one in POSES]), strict=True)
-        )
-        for pose, over in product(POSES, (False, True)):
-            if over and not (tried and _needs_both_sides(tried[-1][0], pose)):
-                continue
-            wanted = replace(first.wanted, pose=pose, turned_over=over)
-            made = poses[pose]
-            if over:
-                try:
-                    made = turned_over(tried[-1][0].made)
-                except InputError:
-                    continue
-            if made is None:
-                continue
-            if float(_up(made) @ _up(first.made)) > SAME and not turns(made):
-                continue
-            harm, found = _harm(made, first.made), None
-            try:
-                found = None if harm else measure(made, _longest(made, best))
-            except TooSlowError as error:
-                harm = str(error)
-            one = Way(made, wanted, found)
-            tried.append((one, harm))
-            if not harm and _is_quicker(one, best):
-                best = one
-        best = _with_pose_told(best, first, tried)
+        with counted("poses tried", len(POSES)) as progress:
+            best = _best_pose(first, again, turned_over, measure, progress)
     is_known = best.found is not None and best.found.places  # else a heavier one takes longer still
     if is_known and _is_slow(best) and 2 * best.made.design.shot.count <= MOST_BALLS:
         made = with_charge(best.made, LAYER)
@@ -103,6 +82,44 @@ def propose_quicker(
             made = replace(made, reasons={**made.reasons, "shot.mass_g": reason})
             best = Way(made, best.wanted, found)
     return best
+
+
+def _best_pose(
+    first: Way,
+    again: Callable[[Sequence[Wanted]], Sequence[Proposal | None]],
+    turned_over: Callable[[Proposal], Proposal],
+    measure: Callable[[Proposal, float], Measured | None],
+    progress: Progress,
+) -> Way:
+    """Return the quickest way over all poses, which tells them all; see `propose_quicker`."""
+    best = first
+    tried: list[tuple[Way, str]] = []
+    poses = dict(zip(POSES, again([replace(first.wanted, pose=one) for one in POSES]), strict=True))
+    for pose, over in product(POSES, (False, True)):
+        progress(POSES.index(pose), len(POSES), None)
+        if over and not (tried and _needs_both_sides(tried[-1][0], pose)):
+            continue
+        wanted = replace(first.wanted, pose=pose, turned_over=over)
+        made = poses[pose]
+        if over:
+            try:
+                made = turned_over(tried[-1][0].made)
+            except InputError:
+                continue
+        if made is None:
+            continue
+        if float(_up(made) @ _up(first.made)) > SAME and not turns(made):
+            continue
+        harm, found = _harm(made, first.made), None
+        try:
+            found = None if harm else measure(made, _longest(made, best))
+        except TooSlowError as error:
+            harm = str(error)
+        one = Way(made, wanted, found)
+        tried.append((one, harm))
+        if not harm and _is_quicker(one, best):
+            best = one
+    return _with_pose_told(best, first, tried)
 
 
 def _needs_both_sides(one: Way, pose: Pose) -> bool:
@@ -193,15 +210,27 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
         over = " and turned over" if one.wanted.turned_over else ""
         return (one.wanted.pose or "evenly exposed").replace("-", " ") + over
 
-    texts = []
+    texts, trials = [], []
     for one, harm in [(first, ""), *tried]:
-        name = named(one)
+        name, outcome = named(one), harm
         what = harm or _said(one.found)
         if one is not best and one.found and best.found and one.found.places:
             why = _objection(one, one.found, best, best.found)
             if why and one.found.time_to_98 < best.found.time_to_98:
                 what += f" ({why})"
-        count = one.made.sonotrode_count
+                outcome = why
+        count, found = one.made.sonotrode_count, one.found
+        trials.append(
+            PoseTrial(
+                name,
+                count,
+                one.made.settings,
+                found and found.time_to_98,
+                found is not None and found.places,
+                found and found.intensity,
+                "taken" if one is best else outcome,
+            )
+        )
         on, taken = f" on {count} sonotrodes" if count > 1 else "", " (taken)" * (one is best)
         on += f" in {one.made.settings} settings" if one.made.settings > 1 else ""
         texts.append(f"{name}{on}: {what}{taken}")
@@ -209,7 +238,7 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
         return best
     pose, _, why = best.made.reasons["part.rotate_deg"].rpartition(": ")
     ball = first.made.tables["shot"]["diameter_mm"]  # those of the proposal may be others
-    tried_ones = f"poses tried by pilots with balls of {ball:g} mm: {', '.join(texts)}"
+    tried_ones = f"{TRIED} with balls of {ball:g} mm: {', '.join(texts)}"
     reason = f"{pose}: {why}; {tried_ones}" if best is first else f"{pose}: {tried_ones}"
     reasons = {**best.made.reasons, "part.rotate_deg": reason}
-    return best._replace(made=replace(best.made, reasons=reasons))
+    return best._replace(made=replace(best.made, reasons=reasons, poses=tuple(trials)))

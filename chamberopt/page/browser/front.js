@@ -151,12 +151,12 @@ find("part").addEventListener("change", () => attempt(() => look(find("part").va
 
 // Show the command that proposes a chamber: how far it is, and in the end what it proposes.
 let drawn = 0, told = ""; // when the picture that is shown was drawn; the proposal that is shown
-function tell({ steps, seconds, printed, warnings, fault, exit, picture, result, proposal }) {
+function tell({ steps, stage: at, seconds, printed, warnings, fault, exit, picture, result, proposal }) {
   find("made").hidden = false;
   find("stop").hidden = exit !== null;
   find("busy").textContent = exit !== null ? "" : sinceBegin(seconds);
   const isStopped = exit === 130, atEnd = isStopped ? ["Stopped."] : [];
-  if (exit !== null || steps.length) find("progress").replaceChildren(...(exit === null ? stage(steps) : atEnd));
+  if (exit !== null || steps.length) find("progress").replaceChildren(...(exit === null ? stage(steps, at) : atEnd));
   find("warnings").replaceChildren(...warnings.map(warning));
   find("printed").replaceChildren(...asLines(printed));
   find("printed-fold").hidden = exit === null || !printed.length;
@@ -180,14 +180,15 @@ function tell({ steps, seconds, printed, warnings, fault, exit, picture, result,
   find("to-settle").hidden ||= isDraft; // what the pilots change is not to be settled
 }
 
-function showProposal({ sentence, rows, trials, matters, choices }, design) {
+function showProposal({ sentence, rows, tables, matters, choices }, design) {
   find("sentence").replaceChildren(...onPage(sentence));
   find("to-settle").hidden = !matters.length;
   find("matters").replaceChildren(...matters.map(({ mark, text, balls }) => element("li", {}, element("b", { textContent: mark }), ...onPage(text), ...balls.map(withBalls))));
   find("rows").replaceChildren(...rows.map(({ name, value, reasons }) => element("tr", {},
     element("th", { textContent: name[0].toUpperCase() + name.slice(1) }),
     element("td", {}, element("b", {}, ...onPage(value)), ...reasons.map((words) => element("p", {}, ...onPage(words)))))));
-  find("trials").replaceChildren(...trials ? [element("caption", { textContent: trials.caption }), ...[trials.head, ...trials.rows].map(([first, ...others], k) => element("tr", {}, element("th", { textContent: first }), ...others.map((textContent) => element(k ? "td" : "th", { textContent }))))] : []);
+  find("tables").replaceChildren(...tables.map(({ caption, head, rows: cells }) => element("details", {}, element("summary", { textContent: caption }),
+    element("table", {}, ...[head, ...cells].map(([first, ...others], k) => element("tr", {}, element("th", { textContent: first }), ...others.map((textContent) => element(k ? "td" : "th", { textContent }))))))));
   find("choices").replaceChildren(...choices.map(({ name, text, place, alone, is_target }) => {
     const title = [place && `at ${place} mm in the part's file`, alone].filter(Boolean).join("; ");
     const button = element("button", { title, ariaPressed: String(is_target) }, name, element("small", { textContent: ` ${text}` }));

@@ -46,11 +46,14 @@ function forget(steps) {
   for (const step of begun.keys()) if (!steps.some((one) => one.step === step)) begun.delete(step);
 }
 
-// A command in stages as a line of its stage and what is being done of it, and a bar.
-export const stage = ([first, ...inner]) => {
-  forget([first, ...inner]);
-  const last = inner.at(-1);
-  return [element("div", {}, last ? `${first.step} (${words(last)})` : `${first.step}${time(first)}`, element("progress"))];
+// A command in stages as a line of its stage and what is being done of it, and a bar of the stages. Pilots of unlike lengths tell no time left.
+let farthest = 0; // of the bar, which never goes back
+export const stage = ([first, ...inner], at) => {
+  const counted = inner.length > 1 && inner[0].total ? inner[0].done / inner[0].total : 0;
+  if (at?.number === 1) farthest = 0;
+  farthest = Math.max(farthest, at ? at.number - 1 + counted : 0);
+  const words = inner.map(({ step, done, total }) => total ? `${step}: ${Math.floor(done)} of ${total}` : step).join(", ");
+  return [element("div", {}, words ? `${first.step} (${words})` : first.step, Object.assign(element("progress"), at ? { max: at.count, value: farthest } : {}))];
 };
 
 export const bars = (steps) => {

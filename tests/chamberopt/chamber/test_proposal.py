@@ -253,6 +253,7 @@ def test_what_faces_away_is_offered_for_leaving_out(
         tables={"part": {"mesh": str(tmp_path / "gear.obj")}, "part.target": target.keys},
         reasons={},
         trials=(),
+        poses=(),
         strips=None,
     )
     away, hidden, sharp = find_left_out(made)
@@ -443,7 +444,9 @@ def test_names_cannot_write_into_the_design(tmp_path: Path) -> None:
     tables = {"part": {"mesh": str(tmp_path / f"{bad}.stl")}, "part.target": target.keys}
     reasons = {"part.target": target.reason}
     design = SimpleNamespace(in_steps=FEW_BALLS)
-    made = SimpleNamespace(tables=tables, reasons=reasons, known=known, design=design, trials=())
+    made = SimpleNamespace(
+        tables=tables, reasons=reasons, known=known, design=design, trials=(), poses=()
+    )
     text = design_text(made, tmp_path)
     written = {"part": {"mesh": f"{bad}.stl", "target": {"surface": [bad]}}}
     assert tomllib.loads(text) == written

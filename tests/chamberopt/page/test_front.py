@@ -169,7 +169,8 @@ def test_a_draft_is_told_before_the_pilots(front: Served, tmp_path: Path) -> Non
     assert now["answer"] is None
     rows = {row["name"]: row["value"] for row in now["proposal"]["rows"]}
     assert "height" in rows["chamber"][0]
-    assert not any("draft" in line for line in now["lines"])
+    assert 1 <= now["stage"]["number"] <= now["stage"]["count"] == 7
+    assert not any("draft" in line or "stage" in line for line in now["lines"])
     assert b'"shape_mm"' in front.ask("/chamber", {})
     front.ask("/stop", {})
     while (now := json.loads(front.get("/status").read()))["exit"] is None:

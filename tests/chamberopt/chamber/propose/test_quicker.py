@@ -23,6 +23,7 @@ from chamberopt.chamber.propose.quicker import SEVERAL, Way, propose_quicker
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.load import load_design
+from chamberopt.documents.proposal import proposal_in_words
 from chamberopt.geometry.triangles import rotation_matrix
 
 LEAF = (130.0, 26.0, 6.0)  # mm: length, width and thickness of a bar with a broad side to peen
@@ -124,6 +125,14 @@ def test_the_quicker_pose_is_taken_and_all_times_are_told(
     told = best.made.reasons["part.rotate_deg"]
     for text in ("evenly exposed: 98 % after about 2000 s", "on edge on", "98 % after about 510 s"):
         assert text in told
+    assert [(one.pose, one.outcome) for one in best.made.poses if one.time_to_98 == 512.0] == [
+        ("on edge", "taken")
+    ]
+    table = proposal_in_words(best.made, ()).poses
+    assert table is not None
+    names = [row[0] for row in table.rows]
+    assert names[0] == "on edge"
+    assert {"lying", "evenly exposed"} <= {*names}
 
 
 def test_a_lying_part_on_which_balls_would_rest_is_tried_turned_over(
