@@ -41,7 +41,14 @@ from chamberopt.documents.study import aim_in_words
 from chamberopt.documents.wanted import times_longer
 from chamberopt.documents.wording import metric_label, value_text
 from chamberopt.geometry.faces import Border
-from chamberopt.page.answers import packed, part_answer, shape_answer, step_texts, surface_answer
+from chamberopt.page.answers import (
+    packed,
+    part_answer,
+    picked_answer,
+    shape_answer,
+    step_texts,
+    surface_answer,
+)
 from chamberopt.page.checker import Checker
 from chamberopt.page.duration import duration_in_words
 from chamberopt.page.edited_file import OF_MATTERS, EditedFile, custom_shape, design_fields
@@ -299,6 +306,11 @@ class Acts:
         if asked["act"] == "face":
             return {"faces": [self._picker.face(design, triangle, border, alike)]}
         return self._picker.with_face(design, asked["table"], triangle, border, alike, add)
+
+    def picked(self, asked: Any) -> bytes:
+        """Return what a target lists face by face, or name by name, with areas and triangles."""
+        design = self._file(asked).with_changes(asked["changes"])
+        return picked_answer(preview_part(design).mesh, self._picker.picked(design, asked["table"]))
 
     def save(self, asked: Any) -> dict[str, object]:
         self._file(asked).save(asked["changes"])

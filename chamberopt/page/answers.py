@@ -16,7 +16,13 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import first_warnings, notes, shot_reach
 from chamberopt.chamber.checks.facts import describe, first_facts, with_clearance
 from chamberopt.chamber.checks.warning import UNPEENED, DesignWarning, WarningKind
-from chamberopt.chamber.layout.target import Surface, find_surface, named_surfaces, surfaces
+from chamberopt.chamber.layout.target import (
+    Surface,
+    area_in_mm2,
+    find_surface,
+    named_surfaces,
+    surfaces,
+)
 from chamberopt.chamber.part import chosen_on_part, chosen_triangles, named_surface, preview_part
 from chamberopt.chamber.reach import reached_part_share
 from chamberopt.chamber.scene import chamber_mesh
@@ -27,8 +33,9 @@ from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.documents.facts import facts_in_words
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.sight import way_to_see
-from chamberopt.geometry.triangles import border_edges, sharp_edges
+from chamberopt.geometry.triangles import areas, border_edges, sharp_edges
 from chamberopt.page.page_words import Words, on_page
+from chamberopt.page.picking import Picked
 from chamberopt.pictures.charts.colours import EDGES, GREEN, KINDS
 
 # Where a triangle of the part is: numbers of these kinds.
@@ -64,6 +71,24 @@ def surface_answer(mesh: PartMesh, name: str) -> bytes:
     known = () if name in mesh.groups else _surfaces(mesh)  # faces take longer to find
     found = np.flatnonzero(find_surface(mesh, known, name).triangles)
     return packed({}, triangles=found)
+
+
+def picked_answer(mesh: PartMesh, picked: Sequence[Picked]) -> bytes:
+    """Return what a target lists, in words, and the numbers of the triangles of each as `face_K`.
+
+    A face has the name that the proposal gives it, where it has one.
+    """
+    known = _surfaces(mesh) if any(not one.name for one in picked) else ()
+    area, rows, found = areas(mesh.vertices, mesh.triangles), [], {}
+    for k, one in enumerate(picked):
+        same = (x.name for x in known if np.array_equal(x.triangles, one.triangles))
+        within = (f"one of {x.name}" for x in known if x.triangles[one.triangles].all())
+        name = one.name or next(same, "") or next(within, "a face")
+        place = "" if one.at_mm is None else f"at {', '.join(plain(x, 4) for x in one.at_mm)} mm"
+        size = area_in_mm2(float(area[one.triangles].sum()))
+        rows.append({"name": name, "size": size, "place": place, "by_name": bool(one.name)})
+        found[f"face_{k}"] = np.flatnonzero(one.triangles)
+    return packed({"rows": rows}, **found)
 
 
 @lru_cache(maxsize=2)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,18 @@ DIGITS = 4  # decimals of a place [mm]: a tenth of a micrometre
 TARGET_TABLE, HOLDER_TABLE, MASK_TABLE = "part.target", "holder.at", "mask.at"
 OTHER_WAYS = ("surface", "direction", "angle_deg", "box_mm", "radius_mm")
 Row = dict[str, Any]  # an item of `faces` in a target's table
+
+
+class Picked(NamedTuple):
+    """One item of a target's table: a name of the part's file, or a face by a place on it [mm].
+
+    Attributes:
+        triangles: those of the part that it chooses, (m,) bool.
+    """
+
+    name: str
+    at_mm: Sequence[float] | None
+    triangles: np.ndarray
 
 
 class Picker:
@@ -93,6 +106,16 @@ class Picker:
             others = {f"{table}.{key}": None for key in OTHER_WAYS}
             others |= {MASK_KIND: "shell", **{f"mask.{key}": None for key in OF_MASK}}
         return {f"{table}.faces": rows, **others}
+
+    def picked(self, design: Design, table: str) -> list[Picked]:
+        """Return the faces, or the names of the file, that a target's table lists one by one."""
+        preview = preview_part(design)
+        mesh, (selection, _) = preview.mesh, _selection(design, table, preview)
+        if selection.faces:
+            rows = [one.model_dump(mode="json", exclude_defaults=True) for one in selection.faces]
+            return [Picked("", row["at_mm"], self._mask(row, mesh)) for row in rows]
+        named = [one for one in selection.surface if one in mesh.groups]
+        return [Picked(one, None, mesh.groups[one]) for one in named]
 
     def face(self, design: Design, triangle: int, border: Border, alike: bool) -> Row:
         """Return the face to which a triangle belongs, as an item of a design's list `faces`."""

@@ -10,12 +10,13 @@ export function colourByState(view, name, { states, kinds }, state) {
   view.colourTriangles(name, colours);
 }
 
-// `answer` gives what the server answers of the triangles of the surface that `named` names.
+// `answer` gives the triangles of the surface that `named` names, or what the server answers of them.
 export function lights(named, view, answer, colour) {
   let isOn = false, found = null;
   const show = () => attempt(async () => {
     isOn = true;
-    found ??= unpack(await answer()).triangles;
+    const told = found ?? await answer();
+    found = told instanceof ArrayBuffer ? unpack(told).triangles : told;
     if (isOn) view.highlight("part", found, colour());
   });
   const hide = () => {

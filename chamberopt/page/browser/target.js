@@ -42,7 +42,34 @@ export function showChosen() {
   }
   const named = names();
   for (const button of find("names").querySelectorAll("button")) button.ariaPressed = String(named.includes(button.textContent));
+  showPicked(table, kept);
   find("chosen").textContent = [`[${table}]`, ...Object.entries(kept).map(([key, now]) => `${key} = ${JSON.stringify(now)}`)].join("\n");
+}
+
+// What is picked, face by face: pointed at, it lights up on the part, and its cross takes it back.
+let listed = "";
+async function showPicked(table, kept) {
+  const now = JSON.stringify([table, kept]);
+  if (now === listed || find("target").hidden) return;
+  listed = now;
+  const told = await ask("/picked", { changes: state.changes, table }).then(unpack, () => ({ rows: [] })); // the shape says what is wrong
+  if (now !== listed) return;
+  view.highlight("part", null); // of a row that is gone
+  find("picked").replaceChildren(...told.rows.map(({ name, size, place, by_name }, k) => {
+    const out = element("button", { type: "button", textContent: "✕", title: "take it back", ariaLabel: `Take ${name} back` });
+    out.addEventListener("click", () => by_name ? withoutName(name) : withoutFace(table, kept.faces, k));
+    return lights(element("li", { title: place, tabIndex: 0 }, element("span", {}, element("b", { textContent: name }), ` ${size}`), out), view, async () => told[`face_${k}`], () => fillTarget.part.pointed);
+  }));
+}
+function withoutFace(table, faces, k) {
+  const left = faces.filter((_, i) => i !== k);
+  if (left.length) change({ [`${table}.faces`]: left });
+  else if (table === "holder.at") only({});
+  else say("nothing would be left: click another face first");
+}
+function withoutName(name) {
+  const left = names().filter((one) => one !== name);
+  if (left.length) only({ surface: left }); else say("nothing would be left: add another name first");
 }
 
 // The names that the target, or another table, is chosen by, as far as it is chosen by names.
@@ -55,8 +82,7 @@ export function names(table = find("surface").value) {
 // Add a name of the file to the target, or take it away, as a click on a face does.
 function choose(name) {
   const takes = document.querySelector("input[name=act]:checked").value === "take";
-  const wanted = takes ? names().filter((one) => one !== name) : [...new Set([...names(), name])];
-  if (wanted.length) only({ surface: wanted }); else say("nothing would be left: add another name first");
+  if (takes) withoutName(name); else only({ surface: [...new Set([...names(), name])] });
 }
 
 // Choose by these keys alone.

@@ -73,6 +73,9 @@ def test_a_face_and_all_alike_are_added_and_taken_away(gear: Edited) -> None:
     every = chosen(gear.design)
     (row,) = gear.design.part.target.faces  # the one tip is among all that are alike
     assert row.alike
+    (listed,) = gear.picker.picked(gear.design, TARGET)
+    assert (listed.triangles == every).all()
+    assert listed.at_mm == list(row.at_mm)
     assert every.sum() == 20 * tip.sum()
     gear.click(triangle, add=False)
     assert len(gear.design.part.target.faces) == 19
