@@ -48,6 +48,7 @@ export function showChosen() {
 
 // What is picked, face by face: pointed at, it lights up on the part, and its cross takes it back.
 let listed = "";
+const NARROWER = ["direction", "box_mm", "radius_mm"];
 async function showPicked(table, kept) {
   const now = JSON.stringify([table, kept]);
   if (now === listed || find("target").hidden) return;
@@ -59,7 +60,7 @@ async function showPicked(table, kept) {
     const out = element("button", { type: "button", textContent: "✕", title: "take it back", ariaLabel: `Take ${name} back` });
     out.addEventListener("click", () => by_name ? withoutName(name) : withoutFace(table, kept.faces, k));
     return lights(element("li", { title: place, tabIndex: 0 }, element("span", {}, element("b", { textContent: name }), ` ${size}`), out), view, async () => told[`face_${k}`], () => fillTarget.part.pointed);
-  }));
+  }), ...(NARROWER.some((key) => key in kept) ? [element("li", { className: "soft", textContent: `${told.rows.length ? "of these " : ""}what a direction, a box or a radius leaves, as the file says` })] : []));
 }
 function withoutFace(table, faces, k) {
   const left = faces.filter((_, i) => i !== k);
@@ -92,7 +93,7 @@ function only(keys) {
 }
 find("whole").addEventListener("click", () => only({}));
 find("surface").addEventListener("change", showChosen);
-for (const tab of document.querySelectorAll("nav button")) tab.addEventListener("click", showChosen);
+for (const tab of document.querySelectorAll("nav button")) tab.addEventListener("click", () => setTimeout(showChosen)); // once the tab is shown
 
 // Whether a click takes a face as the CAD file has it, not up to a crease.
 const byCadFaces = () => Boolean(fillTarget.part?.cad_face) && find("cad-face").checked;
