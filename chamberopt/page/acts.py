@@ -342,6 +342,7 @@ class Acts:
             **_told_of(file),
             "chosen": {name: _chosen(design, name) for name in picked_surfaces(design)},
             "is_proposed": file.is_proposed,
+            "intensity": on_page(file.proposed_intensity),
             "of_matters": OF_MATTERS,
             "is_drawn": design.chamber.setup() is not None,
             "files": _files_beside(file.path),

@@ -46,6 +46,7 @@ FACETS, ACCURACY = "chamber.facets", "process.accuracy"  # a number, and where i
 # A proposed design begins with this; the comment behind each number is then the reason for it.
 PROPOSED = "proposed by `chamberopt new`"
 CHANGED = "changed by you; proposed was "  # and the value, before the reason behind that
+INTENSITY_LINE = re.compile(r"^# Almen intensity: (.+)$|^intensity_mmA = .*?# (.+)$", re.MULTILINE)
 TO_SETTLE = "to_settle"  # from which the page takes out what is settled
 # Tables that what is to be settled of a proposal is told of; a matter says which were changed.
 OF_MATTERS = "part", "chamber", "sonotrode", "shot", "holder", "mask", "materials"
@@ -153,6 +154,17 @@ class EditedFile:
     def is_proposed(self) -> bool:
         """True if the comments in the file are reasons of the values that were proposed."""
         return PROPOSED in self.text.partition("\n")[0]
+
+    @property
+    def proposed_intensity(self) -> str:
+        """The Almen intensity that was proposed, beside what is usual; "" if that may hold no more.
+
+        It stands behind a wanted intensity, or in a line of its own.
+        """
+        found = INTENSITY_LINE.search(self.text)
+        if not self.is_proposed or found is None or CHANGED in self.text or SINCE in self.text:
+            return ""
+        return "; ".join((found[1] or found[2]).split("; ")[:2])
 
     def with_steps(self, kept: Sequence[int]) -> EditedFile:
         """Return the file as it would be with some of its steps alone.

@@ -23,11 +23,11 @@ export async function followed(show, started) {
 const inWords = (seconds) => seconds < 90 ? `${Math.ceil(seconds / 5) * 5} s` : `${Math.ceil(seconds / 60)} min`;
 
 // The time that is left of a step, by its pace since the first of it was done; until then, for how long it has gone on.
-// Of the item that is under way the part counts that the step within has done.
+// Of the item that is under way the part counts that the step within has done, once one item has told how much of that it takes.
 const begun = new Map();
 function time({ step, done, total }, within) {
   const now = performance.now() / 1000, begin = begun.get(step) ?? { since: now, done: 0 };
-  const part = within?.total ? within.done / within.total : 0, all = done + part;
+  const part = within?.total && done >= 1 ? within.done / within.total : 0, all = done + part;
   if (all < begin.done || !begin.done) Object.assign(begin, { done: all, at: now }); // compiling is no part of the pace
   begun.set(step, begin);
   if (now - begin.since < SHORT || (total && done >= total)) return "";
@@ -39,7 +39,7 @@ function time({ step, done, total }, within) {
 // For how long a command has worked.
 export const sinceBegin = (seconds) => seconds < 120 ? `at work for ${seconds} s` : `at work for ${Math.floor(seconds / 60)} min ${seconds % 60} s`;
 
-const words = (one, within) => `${one.step}${one.total ? `: ${Math.floor(one.done)} of ${one.total}` : one.done ? `: ${Math.floor(one.done)} so far` : ""}${one.best === null ? "" : `, best ${Number(one.best.toPrecision(4))}`}${time(one, within)}`;
+const words = (one, within, isWithin) => `${one.step}${one.total ? `: ${Math.floor(one.done)} of ${one.total}` : one.done ? `: ${Math.floor(one.done)} so far` : ""}${one.best === null ? "" : `, best ${Number(one.best.toPrecision(4))}`}${isWithin ? "" : time(one, within)}`;
 
 // Forget the pace of steps that have ended: one of the same name may follow.
 function forget(steps) {
@@ -58,6 +58,7 @@ export const stage = ([first, ...inner], at) => {
 
 export const bars = (steps) => {
   forget(steps);
-  return steps.map((one, k) => element("div", {}, words(one, steps[k + 1]),
+  const first = steps.findIndex(({ total }) => total); // what is within a step of a known total may end before its own: that tells no time
+  return steps.map((one, k) => element("div", {}, words(one, steps[k + 1], first >= 0 && k > first),
     Object.assign(element("progress"), one.total ? { max: one.total, value: one.done } : {})));
 };

@@ -54,6 +54,17 @@ def test_the_reason_of_a_changed_number_says_of_what_it_was(file: EditedFile) ->
         assert rows["chamber.height_mm"]["reason"] == [comment]
 
 
+def test_the_proposed_intensity_is_told_while_the_numbers_are_those(file: EditedFile) -> None:
+    text = file.path.read_text().replace("# to try", "# room for two balls")
+    head = "# A first chamber, proposed by `chamberopt new`: rules.\n"
+    line = "\n# Almen intensity: expected 0.4 mmA; 0.3-0.41A are usual; to aim at it: ask\n"
+    file.path.write_text(head + text + line)
+    proposed = EditedFile(file.path, False)
+    assert proposed.proposed_intensity == "expected 0.4 mmA; 0.3-0.41A are usual"
+    proposed.save({"chamber.height_mm": 40})
+    assert EditedFile(file.path, False).proposed_intensity == ""
+
+
 def test_what_is_to_be_settled_says_which_values_it_was_told_of(file: EditedFile) -> None:
     """What was changed is said once, until all is settled; the accuracy decides none of it."""
     text = 'to_settle = [\n  "NOT MASKED: ask",\n  "LONG",\n]\n' + file.path.read_text()
