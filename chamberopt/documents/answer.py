@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -54,10 +55,13 @@ def answer(result: Result, start: Result | None) -> str:
                 f"{only}Too few dents were simulated to tell how much of the target is covered "
                 f"after {plain(treatment_time)} s."
             )
-        text = (
-            f"After {plain(treatment_time)} s the target is covered to "
-            f"{mean.format(result.metrics['mean_coverage'])} on average"
-        )
+        if _is_bound(result.metrics["mean_coverage"]):
+            text = f"After {plain(treatment_time)} s {_least_covered(result)}"
+        else:
+            text = (
+                f"After {plain(treatment_time)} s the target is covered to "
+                f"{mean.format(result.metrics['mean_coverage'])} on average"
+            )
         if label.text != mean.text:
             text += f", and its {label.text} is {label.format(result.objective)}"
         return f"{text} (95 % intervals); {full_coverage(result)}."
@@ -99,8 +103,28 @@ def on_average(result: Result) -> str:
     mean = result.metrics["mean_coverage"]
     if mean.in_words == NOT_RESOLVED:
         return f"{full_coverage(result)}; its mean coverage is not resolved"
+    if _is_bound(mean):
+        return f"{full_coverage(result)}; {_least_covered(result)}"
     text = metric_label("mean_coverage").format(mean)
     return f"{full_coverage(result)}; covered to {text} on average"
+
+
+def _is_bound(mean: Estimate) -> bool:
+    """Return whether the least covered places tell that a mean coverage is more than a number.
+
+    Too few dents tell it itself. Beside the coverage of those places, which is larger than that
+    number, the two would read as a contradiction.
+    """
+    return math.isinf(mean.half_width) and mean.in_words not in ("", NOT_RESOLVED)
+
+
+def _least_covered(result: Result) -> str:
+    least = metric_label("p05_coverage").format(result.metrics["p05_coverage"])
+    mean = result.metrics["mean_coverage"].in_words
+    return (
+        f"95 % of the target's area is covered to {least} or more, from which alone the mean is "
+        f"known to be {mean}"
+    )
 
 
 def answer_lines(result: Result, start: Result | None = None) -> list[AnswerLine]:

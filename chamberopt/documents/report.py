@@ -122,7 +122,7 @@ def report(result: Result) -> Document:
         tolerance_section(result),
         _accuracy_and_cost(result, trials),
         _effects(result),
-        _notes(result),
+        notes_section(result),
         _design(result, start),
         _made_with(result),
     )
@@ -321,7 +321,8 @@ def _to_settle(result: Result) -> Section | None:
     return Section("To be settled before it is built", [Items(texts)]) if texts else None
 
 
-def _notes(result: Result) -> Section:
+def notes_section(result: Result) -> Section:
+    """Return the warnings of the check and the notes on a result."""
     warnings, settled = result.record.warnings, {*matters(result.design)}
     told = (text for text in warnings or () if text not in settled)  # those have their own section
     notes = [*(f"Warning: {text}" for text in told), *notes_of(result)]

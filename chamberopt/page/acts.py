@@ -33,10 +33,10 @@ from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
 from chamberopt.documents.answer import on_average
 from chamberopt.documents.comparison import after_shorter_time
-from chamberopt.documents.document import Section, Sentence
+from chamberopt.documents.document import Fold, Section, Sentence
 from chamberopt.documents.overview import comparison_overview
 from chamberopt.documents.proposal import matter_of
-from chamberopt.documents.report import answer_section
+from chamberopt.documents.report import answer_section, notes_section
 from chamberopt.documents.study import aim_in_words
 from chamberopt.documents.wanted import times_longer
 from chamberopt.documents.wording import metric_label, value_text
@@ -168,6 +168,7 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
         InputError: a folder has no usable result, or the results cannot be compared.
     """
     longer: dict[str, object] = {}
+    below: list[Section] = []
     html, content = parts_content(folders)
     results = [*map(load_result, folders)]
     is_alike = len({one.design.process.treatment_time for one in results}) == 1
@@ -180,17 +181,20 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
     else:
         (result,) = results
         first = answer_section(result, load_start(result))
+        notes = notes_section(result)
+        count = len(notes.content)
+        below = [
+            Section(notes.title, [Fold(f"Read {'it' if count == 1 else count}", notes.content)])
+        ]
         if (times := times_longer(result)) > 1:
             now = result.design.process.accuracy.simulated_time_s
             longer = {"times": times, "values": {SIMULATED_TIME: float(f"{times * now:.4g}")}}
     sentences = [one for one in first.content if isinstance(one, Sentence)]
     answers = [one for one in sentences if one.kind in ANSWERS or one.about == "process"]
     figures = [one for one in first.content if one not in answers]
-    html = explained(
-        section(replace(first, content=answers), viewer)
-        + html
-        + (section(Section("In figures", figures), viewer) if figures else "")
-    )
+    below = [*([Section("In figures", figures)] if figures else []), *below]
+    above = section(replace(first, content=answers), viewer)
+    html = explained(above + html + "".join(section(one, viewer) for one in below))
     places = len(folders) > 1 and is_alike  # whether these can be compared
     return {"content": content, "html": html, "longer": longer, "places": places}
 

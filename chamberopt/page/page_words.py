@@ -55,11 +55,12 @@ COMMANDS = {
 _TERMINAL = re.compile(
     "; press Ctrl-C again to stop now|; --no-ranges leaves them out"
     "|(?<= of the target is): chamberopt strip --distance-mm [0-9]+"
-    "|(?<=more note): --verbose shows all|(?<=more notes): --verbose shows all"
     "|(?m:^to resume: .*\\n?)"
     "|; to resume it: .*|; --tolerances simulates them too"
     r"| \(docs/[\w/]+\.md(?:#[\w-]+)?\)|(?:, or|;) use --at ZONE(?: with a zone of the part)?"
 )
+# At the end of a command that has more to say.
+_MORE_NOTES = re.compile(r"(?<=more note)(s?): --verbose shows all")
 # Sizes of strips, as options of a command.
 _DISC, _STRIP = re.compile(r"--disc-mm ([\d.]+)"), re.compile(r"--size-mm ([\d.]+) ([\d.]+)")
 # Surfaces of a part, as options of a command.
@@ -105,6 +106,7 @@ def on_page(text: str, known: set[str] | None = None) -> Words:
     """
     made: Words = []
     at, text = 0, _TERMINAL.sub("", _PLACE.sub("", text))
+    text = _MORE_NOTES.sub(r"\1, below its figures in the tab Results", text)
     text = _STRIP.sub(r"a strip of \1 x \2 mm", _DISC.sub(r"a disc of \1 mm", text))
     text = _TARGETS.sub(lambda found: found[1].replace(" --target ", " and "), text)
     known = set() if known is None else known

@@ -215,6 +215,28 @@ def test_what_is_not_resolved_is_not_in_the_answer_as_a_number(reach: float, onl
     assert answer(result, result).startswith("Too few dents were simulated to tell wheth")
 
 
+def test_a_mean_that_is_but_bounded_is_told_by_the_least_covered_places() -> None:
+    """They are covered to 99.9 %: "94 % on average" beside that would read as a contradiction."""
+    metrics = {
+        "mean_coverage": Estimate(0.999, math.inf, in_words="more than 94 %"),
+        "p05_coverage": Estimate(0.9987, 0.001),
+        "time_to_98_s": Estimate(300.0, 20.0),
+    }
+    result: Any = SimpleNamespace(
+        objective_name="uniform_coverage",
+        objective=Estimate(0.9, 0.1),
+        metrics=metrics,
+        design=SimpleNamespace(process=SimpleNamespace(treatment_time=420.0)),
+        record=SimpleNamespace(field=SimpleNamespace(reachable_share=1.0)),
+    )
+    least = (
+        "95 % of the target's area is covered to 99.87 ± 0.10 % or more, from which alone the mean "
+        "is known to be more than 94 %"
+    )
+    assert answer(result, None).startswith(f"After 420 s {least}, and its uniform ")
+    assert on_average(result).endswith(f"; {least}")
+
+
 @pytest.mark.parametrize(("by", "time"), [("gain", 800.0), ("gain", 1300.0), ("budget", 800.0)])
 def test_a_search_that_has_nothing_to_gain_says_so_in_the_answer(by: str, time: float) -> None:
     """A treatment of 1200 s, in which all is covered or not."""
