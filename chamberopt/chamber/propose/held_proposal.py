@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -49,6 +50,9 @@ CLEAR = 1.5  # distance of a mask from the target, over the diameter of a ball
 # Share of the target that a holder may keep from the balls; where no other holds the part.
 HIDDEN, MOST_HIDDEN = 0.005, 0.03
 LEAST_LEFT, MOST_LEFT = 0.005, 0.15  # share of the target that is left out if no ball touches it
+# Sides of triangles that tell what no ball touches from what is beside it: share of a ball's
+# diameter, and about how many there are at most.
+FINE, MOST_TRIANGLES = 0.25, 30_000
 NARROW = 2.0  # ball diameters: the radius of hollows that balls hardly touch, at most
 MOSTLY, WHOLE = 0.5, 0.9  # share of what is left out, and of the target that names nothing of it
 NO_PLACE = (
@@ -217,14 +221,16 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     hidden = 1.0 - touched_share(made)
     if not LEAST_LEFT < hidden < MOST_LEFT:
         return made
-    target = {**made.tables["part.target"], "reachable": True}
-    tables = {**made.tables, "part.target": target}
-    narrowed = checked(tables, made.reasons, floor, made.known, made.mesh, shop)
-    part, share = made.chamber.part, touched(made.design, made.chamber)
-    gone = part.area[part.target].sum() - part.area[narrowed.chamber.part.target].sum()
-    left_out = float(gone / part.area[part.target].sum())
+    narrowed, left_out = _narrowed(made, floor, shop, {"reachable": True})
+    if left_out < MOSTLY * hidden:  # its triangles are wider than what no ball touches
+        area = float(made.chamber.part.area[made.chamber.part.target].sum())
+        size = max(FINE * min(made.design.shot.diameters), math.sqrt(area / MOST_TRIANGLES))
+        keys = {"reachable": True, "element_mm": float(f"{1e3 * size:.2g}")}
+        with suppress(InputError):  # such as that a set-up keeps its triangles
+            narrowed, left_out = _narrowed(made, floor, shop, keys)
     if left_out < LEAST_LEFT:  # specks, which stay in the target
         return made
+    part, share = made.chamber.part, touched(made.design, made.chamber)
     left = np.where(part.target, (1.0 - share) * part.area, 0.0)
     place = one_of(part.vertices[part.triangles].mean(axis=1), left)
     text = (
@@ -239,6 +245,21 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
             f"than {2e3 * radius:.2g} mm (--ball-mm), or agree on it"
         )
     return replace(narrowed, reasons={**narrowed.reasons, "part.target.reachable": text})
+
+
+def _narrowed(
+    made: Proposal, floor: Floor, shop: Shop | None, keys: dict[str, Any]
+) -> tuple[Proposal, float]:
+    """Return a proposal with further keys of its target, and the share that they leave out.
+
+    Raises InputError if no chamber can be built with them.
+    """
+    tables = {**made.tables, "part.target": {**made.tables["part.target"], **keys}}
+    narrowed = checked(tables, made.reasons, floor, made.known, made.mesh, shop)
+    whole, left = (
+        float(one.area[one.target].sum()) for one in (made.chamber.part, narrowed.chamber.part)
+    )
+    return narrowed, 1.0 - left / whole
 
 
 def _where_left(made: Proposal, left: np.ndarray) -> str:

@@ -1,5 +1,7 @@
 """At which edges a part is parted into faces, from which its target is chosen."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from manifold3d import CrossSection, Manifold
@@ -17,6 +19,8 @@ from chamberopt.chamber.layout.target import (
     propose_target,
     surfaces,
 )
+from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from tests.chamberopt.chamber.layout.test_arbor import drum, part_of
 
@@ -184,13 +188,17 @@ def test_the_surfaces_in_which_fillets_lie_are_named(wide: float, is_told: bool)
     assert is_told or not words
 
 
+def tee(wide: float, long: float) -> Manifold:
+    """A T of plates with a bevel at 45 degrees in each corner, so wide along both plates [mm]."""
+    half = [[0, 0], [60, 0], [60, 10], [5 + wide, 10], [5, 10 + wide], [5, 60], [0, 60]]
+    outline = CrossSection([np.array(half, dtype=float)])
+    return Manifold.extrude(outline + outline.mirror((1.0, 0.0)), long)
+
+
 @pytest.mark.parametrize(("wide", "count"), [(7.0, 2), (0.0, 0), (30.0, 0)])
 def test_the_welds_of_a_joint_are_chosen(wide: float, count: int) -> None:
     """Two bevels at 45 degrees in the corners of a T, 60 mm long; too wide ones are none."""
-    half = [[0, 0], [60, 0], [60, 10], [5 + wide, 10], [5, 10 + wide], [5, 60], [0, 60]]
-    outline = CrossSection([np.array(half, dtype=float)])
-    joint = outline + outline.mirror((1.0, 0.0))
-    mesh, body = part_of(Manifold.extrude(joint, 60.0))
+    mesh, body = part_of(tee(wide, 60.0))
     known = surfaces(mesh)
     welds = [one for one in known if one.name == "bevels"]
     assert len(welds) == (count > 0)
@@ -228,3 +236,18 @@ def test_flat_sides_of_a_root_are_not_peened_with_those_of_a_blade() -> None:
     target = propose_target(mesh, surfaces(mesh), [])
     assert target.reason.startswith("face 1: the largest")
     assert body.triangles_center[target.triangles, 2].min() > 0.0
+
+
+def test_what_no_ball_touches_of_a_coarse_weld_is_left_out(tmp_path: Path) -> None:
+    """Both edges of a bevel at 45 degrees keep a ball of radius r off by r tan(22.5 degrees).
+
+    The file has two triangles for each bevel: smaller ones are asked for to tell them apart.
+    """
+    part_of(tee(7.0, 60.0))[1].export(tmp_path / "joint.stl")
+    wanted = Wanted(unit="mm", ball_mm=2.0, alloy="S355")
+    made = propose(tmp_path / "joint.stl", wanted, lambda _: ())
+    assert made.tables["part.target"]["reachable"] is True
+    part, wide = made.chamber.part, 7.0 * np.sqrt(2.0)
+    left = float(part.area[part.target].sum())
+    within = wide - 2.0 * np.tan(np.radians(22.5))
+    assert 1e6 * left == pytest.approx(2.0 * 60.0 * within, rel=0.02)
