@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from chamberopt.chamber.build import build_chamber
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
-from chamberopt.pictures.part_drawing import draw_chamber
+from chamberopt.pictures.drawing.chamber import draw_chamber
 
 ROOT = Path(__file__).resolve().parents[1]
 WIDE, TALL = 150.0, 62.0  # mm on the page, of each drawing

@@ -48,9 +48,9 @@ ORDER = {
         "vtp_files records load arrays_file write rebuild flight+impacts+impact_energy compare "
         "command_records"
     ),
-    "chamberopt/pictures": "charts+quantities camera drawn_part actors+overlay+subprocess_drawing "
-    "view picture_page panels coverage+dents+difference+film+part+part3d "
-    "section part_drawing comparison",
+    "chamberopt/pictures": "charts+quantities drawing camera drawn_part "
+    "actors+overlay+subprocess_drawing view picture_page panels "
+    "coverage+dents+difference+film+part+part3d comparison",
     "chamberopt/cli": "facts+interrupt+options+resume console prepare teller commands command_line",
     "sim_core": "errors numerics balls effects geometry motion impulses scene contact detect loop",
 }

@@ -37,16 +37,16 @@ from chamberopt.peening.strip_holder import target_level_mm
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
 from chamberopt.pictures.charts.figure_style import ignore_settings_here
 from chamberopt.pictures.coverage import draw_coverage
-from chamberopt.pictures.part_drawing import (
+from chamberopt.pictures.drawing.chamber import (
     LEGEND,
     RASTER,
-    Limits,
     draw_chamber,
-    draw_openings,
     drawing_height,
     drawing_scale,
 )
-from chamberopt.pictures.section import face_size_mm
+from chamberopt.pictures.drawing.cuts import face_size_mm
+from chamberopt.pictures.drawing.dimensions import Limits
+from chamberopt.pictures.drawing.openings import draw_openings
 from chamberopt.printers.report_page import PageFile, require_free_page
 from chamberopt.results.arrays_file import load_chamber
 from chamberopt.results.load import load_result

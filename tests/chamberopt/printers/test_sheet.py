@@ -10,10 +10,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import matters
 from chamberopt.chamber.checks.openings import Opening
 from chamberopt.chamber.checks.strips import StripOfTarget
@@ -24,8 +23,6 @@ from chamberopt.common.number_text import estimate_text
 from chamberopt.design.almen_strip import USUAL_K
 from chamberopt.design.fixture import LEAST_GAP_MM, joint_in_words, slit_mm, tight_gap_mm
 from chamberopt.design.intensity import WantedIntensity
-from chamberopt.design.shape_surface import TAG_SONOTRODE
-from chamberopt.design.sonotrode import Face
 from chamberopt.documents.answer import answer_lines
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Document, Section, Sentence, Table
@@ -35,7 +32,6 @@ from chamberopt.documents.sheet import (
     AsBuilt,
     alarms,
     chamber_limits,
-    drawn_openings,
     first_checks,
     limit_tables,
     process_sheet,
@@ -45,16 +41,9 @@ from chamberopt.documents.sheet import (
 )
 from chamberopt.documents.wording import metric_label, plain
 from chamberopt.peening.tolerance_result import ToleranceResult, ToleratedFigure
-from chamberopt.pictures.part_drawing import (
-    draw_chamber,
-    draw_openings,
-    drawing_height,
-    drawing_scale,
-)
-from chamberopt.pictures.section import cut, face_size_mm, inside, section_planes
+from chamberopt.pictures.drawing.chamber import draw_chamber
 from chamberopt.pictures.subprocess_drawing import missing_opengl
 from chamberopt.printers.sheet_page import (
-    HEIGHT,
     MARGIN,
     WIDTH,
     _save,
@@ -65,8 +54,9 @@ from chamberopt.printers.sheet_page import (
 )
 from chamberopt.results.load import Result, load_result
 from chamberopt.results.records import FixtureRecord, TrappedRecord, ZoneLimit, ZoneRecord
+from tests.helpers.drawings import boxes_of, require_apart
 from tests.helpers.results.report_folders import simulated
-from tests.helpers.synthetic import chamber_round, machine_values, plate_design
+from tests.helpers.synthetic import machine_values, plate_design
 
 A4 = (595.28, 841.89)  # pt
 MIX = ({"diameter_mm": 2.0, "share": 0.25}, {"diameter_mm": 3.0, "share": 0.75})
@@ -281,55 +271,6 @@ def test_joints_are_as_tight_on_the_sheet_as_the_proposal_has_them(folder: Path)
         assert f"openings {joint_in_words(ball)}, or sealed" in told
 
 
-def sides(*corners: tuple[float, float]) -> np.ndarray:
-    """The lines from each of the corners [mm] to the next one, (k, 2, 2) [m]."""
-    return 1e-3 * np.stack([corners[:-1], corners[1:]], axis=1)
-
-
-def test_outlines_of_openings_are_drawn_with_two_dimensions() -> None:
-    """A U, a U whose wall ends above it, and a wedge that goes on to both sides."""
-    legs = [(-20, 9), (-20, -9), (-17, -9), (-17, 6), (17, 6), (17, -9), (20, -9), (20, 9)]
-    wedge = np.concatenate([sides((-30, -12), (30, -8)), sides((30, 8), (-30, 12))])
-    shapes = [
-        ((40, 18), sides(*legs, legs[0]), 2 * 3 * 18 + 34 * 3),
-        ((40, 18), sides(*legs), 2 * 3 * 18 + 34 * 3),
-        ((60, 24), wedge, 60 * 20),
-    ]
-    for (wide, tall), outline, area in shapes:
-        at = (0.0, 0.0, 0.1), 0.01, (0.0, 0.0, 1.0)
-        one = Opening("the ceiling", (1e-3 * wide, 1e-3 * tall), *at, "other", outline)
-        (words, _), *_ = drawn = drawn_openings(AsBuilt((50.0,), [one, one, one]))
-        assert words.startswith("the ceiling, middle at")
-        figure = Figure(figsize=(WIDTH / 25.4, HEIGHT / 25.4))
-        axes = figure.add_axes((0, 0, 1, 1), xlim=(0, WIDTH), ylim=(0, HEIGHT))
-        scale = draw_openings(axes, drawn, MARGIN, 200.0, (180.0, 180.0))
-        assert scale == "1:1"
-        boxes = boxes_of(figure)
-        require_apart(boxes)
-        assert [text for text, _ in boxes].count(str(wide)) == 3
-        assert [text for text, _ in boxes].count(str(tall)) == 3
-        (x, y) = axes.patches[0].get_path().vertices.T
-        found = 0.5 * abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
-        assert found == pytest.approx(area, rel=1e-6)
-        places = {"3", "37", "15"} if tall == 18 else {"4", "20"}  # from the lower left
-        assert places <= {text.strip() for text, _ in boxes}
-
-
-def test_the_round_of_an_opening_with_a_keyway_has_its_diameter() -> None:
-    angle = np.radians(np.linspace(15.0, 345.0, 111))
-    arc = [(10.0 * np.cos(one), 10.0 * np.sin(one)) for one in angle]
-    key = [(14.0, arc[-1][1]), (14.0, arc[0][1])]
-    at = (0.0, 0.0, 0.1), 0.01, (0.0, 0.0, 1.0)
-    outline = sides(*arc, *key, arc[0]) - [2e-3, 0.0]
-    one = Opening("the ceiling", (0.024, 0.02), *at, "other", outline)
-    figure = Figure(figsize=(WIDTH / 25.4, HEIGHT / 25.4))
-    axes = figure.add_axes((0, 0, 1, 1), xlim=(0, WIDTH), ylim=(0, HEIGHT))
-    draw_openings(axes, [("a shank", one)], MARGIN, 200.0, (180.0, 180.0))
-    boxes = boxes_of(figure)
-    require_apart(boxes)
-    assert {"Ø 20", "24", "20", "19.7", "7.4", "12.6"} <= {text.strip() for text, _ in boxes}
-
-
 def test_what_the_best_costs_is_on_the_sheet(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     result = load_result(folder)
     speed = result.metrics["mean_normal_speed_m_s"]
@@ -466,27 +407,6 @@ def test_a_calibrated_mix_with_zones_and_tolerances(folder: Path) -> None:
     assert held[label] == "5 % below 0.200 ± 0.010; 5 % above 0.200 ± 0.010"
 
 
-def boxes_of(figure: Figure) -> list[tuple[str, np.ndarray]]:
-    """Each text of a page, with its box in pixels."""
-    figure.set_dpi(72.0)
-    draw = FigureCanvasAgg(figure).get_renderer()
-    texts = [one for one in figure.axes[0].texts if one.get_text().strip()]
-    return [(one.get_text(), one.get_window_extent(draw).extents) for one in texts]
-
-
-def require_apart(boxes: list[tuple[str, np.ndarray]]) -> None:
-    """Fail if texts overlap or leave the page."""
-    for text, (x0, y0, x1, y1) in boxes:
-        assert x0 > 0.0, text
-        assert y0 > 0.0, text
-        assert x1 < WIDTH / 25.4 * 72.0, text
-        assert y1 < HEIGHT / 25.4 * 72.0, text
-    for k, (text, one) in enumerate(boxes):
-        for other_text, other in boxes[k + 1 :]:
-            shared = np.minimum(one[2:], other[2:]) - np.maximum(one[:2], other[:2])
-            assert shared.min() < 1.5, (text, other_text)
-
-
 @pytest.mark.parametrize("much", [False, True])
 def test_nothing_overlaps_or_is_cut_off(folder: Path, much: bool) -> None:
     result = load_result(folder)
@@ -584,109 +504,6 @@ def test_the_metal_says_how_surely_its_hardness_is_known(folder: Path) -> None:
     assert metal(alloy="54SiCr6", hardness_HB=530) == "54SiCr6, 530 HB, as given"
 
 
-def test_the_section_shows_the_target() -> None:
-    """No plane along x meets the faces of a cube at y = 10 and -10 mm; those across do."""
-    cube = trimesh.creation.box((20e-3, 20e-3, 20e-3))
-    chamber = chamber_round(cube)
-    across = np.ptp(chamber.part.vertices[chamber.part.triangles][..., 1], axis=1) < 1e-9
-    (plane,) = section_planes(replace(chamber, part=replace(chamber.part, target=across)))
-    assert plane.right == 1
-
-
-@pytest.mark.parametrize("thick", [1.0, 6.0])
-def test_the_section_shows_a_part_in_one_piece_if_its_middle_does(thick: float) -> None:
-    """Two bars one over the other, joined by a web in the middle, from which the target is gone.
-
-    Beside the web the target's line is longer, but the bars look like two loose pieces.
-    """
-    bounds = [((-20, -9, 0), (20, 9, 6)), ((-20, -9, -20), (20, 9, -14))]
-    bounds.append(((-19.9, -0.5 * thick, -15), (19.9, 0.5 * thick, 1)))
-    bars = [trimesh.creation.box(bounds=1e-3 * np.array(one)) for one in bounds]
-    body = trimesh.boolean.union(bars, engine="manifold")
-    inner = np.abs(body.face_normals[:, 2]) > 0.9
-    inner &= np.abs(1e3 * body.triangles_center[:, 2] + 7.0) < 7.1
-    (plane,) = section_planes(chamber_round(body, inner))
-    assert (plane.right, plane.at) == (0, pytest.approx(0.0, abs=1e-9))
-
-
-def on_sonotrode(chamber: Chamber) -> Chamber:
-    """A chamber whose floor is a sonotrode."""
-    height = chamber.vertices[chamber.triangles][..., 2].max(axis=1)
-    face = np.where(height < height.min() + 1e-9, TAG_SONOTRODE, chamber.tags).astype(np.uint8)
-    return replace(chamber, tags=face)
-
-
-def test_the_place_of_a_section_beside_the_axis_is_dimensioned() -> None:
-    for x, y, right in ((0.0, 9.0, 0), (11.0, 0.0, 1)):
-        size = (40e-3, 4e-3, 4e-3) if right == 0 else (4e-3, 40e-3, 4e-3)
-        bar = trimesh.creation.box(size)
-        bar.apply_translation((1e-3 * x, 1e-3 * y, 0.0))
-        chamber = on_sonotrode(chamber_round(bar))
-        (plane,) = section_planes(chamber)
-        assert plane.right == right
-        axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
-        draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0))
-        assert plain(x + y) in [one.get_text() for one in axes.texts]
-
-
-def test_what_stands_out_of_the_chamber_is_drawn_or_broken_off() -> None:
-    """A post of 6 mm through the ceiling: as long as there is room for it, else with a wave."""
-    waves = {}
-    for beyond in (5e-3, 0.5):
-        chamber = on_sonotrode(chamber_round(trimesh.creation.box((6e-3, 6e-3, 20e-3))))
-        vertices = chamber.part.vertices.copy()
-        vertices[vertices[:, 2] > 0.0, 2] = chamber.vertices[:, 2].max() + beyond
-        chamber = replace(chamber, part=replace(chamber.part, vertices=vertices))
-        axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
-        draw_chamber(axes, chamber, 0.0, 150.0, (180.0, 150.0))
-        curves = [np.array(one.get_xydata()) for one in axes.lines]
-        waves[beyond] = [one for one in curves if len(one) > 5 and np.ptp(one[:, 1]) < 1.1]
-    assert waves[5e-3] == []
-    (wave,) = waves[0.5]
-    assert np.ptp(wave[:, 0]) > 5.0
-
-
-def test_the_section_shows_the_profile_that_is_peened() -> None:
-    """Four ribs along y, the longer side: a plane along them shows a block."""
-    bounds = [((-15e-3, -17e-3, 0.0), (15e-3, 17e-3, 10e-3))]
-    bounds += [((x, -17e-3, -8e-3), (x + 4e-3, 17e-3, 1e-3)) for x in 1e-3 * np.arange(-14, 13, 8)]
-    comb = trimesh.boolean.union([trimesh.creation.box(bounds=one) for one in bounds])
-    below = comb.triangles_center[:, 2] < 1e-9
-    chamber = chamber_round(comb, below)
-    assert [one.right for one in section_planes(chamber)] == [0]
-
-
-def test_the_section_shows_the_part() -> None:
-    """One plane along a bar beside the axis; two for bars across each other, apart."""
-    bar = trimesh.creation.box((40e-3, 4e-3, 4e-3))
-    bar.apply_translation((0.0, 9e-3, 0.0))
-    (plane,) = section_planes(chamber_round(bar))
-    assert plane.right == 0
-    assert 7.0 < plane.at < 11.0
-    assert plane.span == pytest.approx(1.0)
-    other = trimesh.creation.box((4e-3, 40e-3, 4e-3))
-    other.apply_translation((30e-3, -30e-3, -20e-3))
-    planes = section_planes(chamber_round(trimesh.util.concatenate([bar, other])))
-    assert {one.right for one in planes} == {0, 1}
-    axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
-    chamber = chamber_round(trimesh.util.concatenate([bar, other]))
-    chamber = on_sonotrode(chamber)
-    drawn = draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0))
-    assert drawn.startswith("Sections A–A and B–B")
-    assert "dashed" not in drawn
-    for face, text in (
-        (Face(diameter_mm=40.0), ""),
-        (Face(diameter_mm=90.0), ", dashed: the sonotrode's rim"),
-        (Face(diameter_mm=400.0), ""),  # far outside of the drawing
-        (
-            Face(size_mm=(80.0, 80.0), columns=2),
-            ", dashed: the joints of the floor's blocks and the sonotrode's rim",
-        ),
-    ):
-        told = draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0), face=face)
-        assert told == f"{drawn}{text}"
-
-
 def test_it_is_an_a4_page_with_a_map_and_replaces_only_an_older_one(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
@@ -734,39 +551,6 @@ def test_an_auditor_finds_version_digests_revision_and_what_requalifies(
     assert not (folder / "process_sheet.pdf").exists()
 
 
-def test_a_section_has_its_area_without_holes() -> None:
-    """A box of 6 x 4 mm with a tunnel of 2 x 2 mm along z, cut between and at its corners."""
-    outer, hole = trimesh.creation.box((6e-3, 4e-3, 9e-3)), trimesh.creation.box((2e-3, 2e-3, 9e-3))
-    vertices = np.concatenate([outer.vertices, hole.vertices])
-    triangles = np.concatenate([outer.faces, hole.faces[:, ::-1] + len(outer.vertices)])
-    for at in (0.0, 1e-3):
-        lines, row = cut(vertices, triangles, 2, at)
-        assert len(lines) == len(row) == 16
-        (around, tunnel) = inside(1e3 * lines).to_polygons()
-        areas = [np.sum(p[:-1, 0] * p[1:, 1] - p[1:, 0] * p[:-1, 1]) / 2 for p in (around, tunnel)]
-        assert areas == pytest.approx([24.0, -4.0])  # of opposite sense: not filled
-    assert inside(cut(vertices, triangles, 2, 1.0)[0]) is None
-
-
-def test_bodies_that_overlap_are_filled_everywhere() -> None:
-    """Two boxes of 4 x 4 mm, of which 2 x 4 mm are in both."""
-    one, other = (trimesh.creation.box((4e-3, 4e-3, 4e-3)) for _ in range(2))
-    vertices = np.concatenate([one.vertices, np.add(other.vertices, [2e-3, 0.0, 0.0])])
-    triangles = np.concatenate([one.faces, other.faces + len(one.vertices)])
-    for axis, area in ((2, 24.0), (1, 24.0), (0, 16.0)):
-        at = 0.5e-3 if axis else -1.5e-3
-        polygons = inside(1e3 * cut(vertices, triangles, axis, at)[0]).to_polygons()
-        found = [np.sum(p[:-1, 0] * p[1:, 1] - p[1:, 0] * p[:-1, 1]) / 2 for p in polygons]
-        assert sum(found) == pytest.approx(area)
-
-
-def test_the_size_of_the_face() -> None:
-    chamber = build_chamber(plate_design())
-    assert face_size_mm(chamber) == pytest.approx((50.0,))
-    stretched = replace(chamber, vertices=chamber.vertices * [2.0, 1.0, 1.0])
-    assert face_size_mm(stretched) == pytest.approx((100.0, 50.0), rel=1e-3)
-
-
 def test_lines_are_broken_to_their_width() -> None:
     text = "the mean is 12.3 ± 0.4 % of it " + 12 * "w"
     lines = broken(text, 30.0, 8.0)
@@ -781,29 +565,3 @@ def test_lines_are_broken_to_their_width() -> None:
         assert "7\u00a0" not in text
     assert broken(100 * "word ", 20.0, 8.0)[-1].endswith("…")
     assert broken("工 gear\x1b\n1", 30.0, 8.0) == ["? gear? 1"]  # the font has no such letters
-
-
-def test_a_drawing_takes_no_more_height_than_its_views() -> None:
-    """At the same scale it is drawn in less height, which leaves larger letters room."""
-    chamber = build_chamber(plate_design())
-    height = drawing_height(chamber, (186.0, 118.0))
-    assert height < 118.0
-    assert drawing_height(chamber, (186.0, height)) == height
-    assert drawing_height(chamber, (186.0, height - 1.0)) < height - 1.0
-
-
-def test_the_plan_is_below_the_sections_where_that_allows_a_larger_scale() -> None:
-    """Section and plan of a long room fit beside each other at 1:5, and below at 1:2."""
-    room = {"shape": "box", "length_mm": 200, "width_mm": 100, "height_mm": 60}
-    chamber_table = {**room, "sonotrode_distance_mm": 15}
-    design = plate_design().changed({"chamber": chamber_table})
-    chamber = build_chamber(design)
-    assert drawing_scale(chamber, (186.0, 70.0)) == pytest.approx(0.2)
-    assert drawing_scale(chamber, (186.0, 150.0)) == pytest.approx(0.5)
-    for tall in (70.0, 150.0):
-        page = Figure().add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, 186.0), ylim=(0.0, tall))
-        draw_chamber(page, chamber, 0.0, tall, (186.0, tall))
-        places = {text.get_text(): text.get_position() for text in page.texts}
-        plan, section = places["plan: x to the right, y up"], places["A–A: x to the right, z up"]
-        assert (plan[1] < section[1] - 20.0) == (tall > 100.0)
-        assert (plan[0] > section[0] + 20.0) == (tall < 100.0)

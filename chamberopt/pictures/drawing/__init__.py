@@ -1,0 +1,1 @@
+"""Draw a chamber to scale with its dimensions, in sections and a plan, and its openings."""

@@ -1,0 +1,106 @@
+"""Draw the plan of a chamber, with the planes of its sections and its sonotrode's rim."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.common.number_text import typeset_plain as plain
+from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL
+from chamberopt.geometry.triangles import border_edges
+from chamberopt.pictures.charts.colours import BLACK, KINDS, SONOTRODE
+from chamberopt.pictures.drawing.cuts import SectionPlane, cut, face_size_mm, inside
+from chamberopt.pictures.drawing.dimensions import Limits, across_line, dimension, with_limits
+from chamberopt.pictures.drawing.section import WIDER
+from chamberopt.pictures.drawing.view import PART, View, draw_lines, label
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from chamberopt.chamber.build import Chamber
+    from chamberopt.design.sonotrode import Face
+
+# mm on paper, lower left and upper right of what is round a plan without words and dimensions
+FREE = (-8.0, -8.0), (8.0, 2.0)
+OFF_AXIS = 0.05  # mm: a section that is farther beside the axis has its place dimensioned
+TARGET = KINDS["target"].colour
+
+
+def draw_plan(
+    axes: Axes, chamber: Chamber, view: View, planes: Sequence[SectionPlane], limits: Limits
+) -> None:
+    from matplotlib.collections import PolyCollection
+
+    part, target = chamber.tags == TAG_PART, chamber.on_target
+    for colour, rows in ((PART, part & ~target), (TARGET, target)):
+        corners = view.place(1e3 * chamber.vertices[chamber.triangles[rows]][:, :, :2])
+        seen = PolyCollection(list(corners), facecolors=colour, edgecolors=colour, lw=0.4)
+        seen.set_rasterized(True)
+        axes.add_collection(seen)
+    halfway, row = cut(chamber.vertices, chamber.triangles, 2, 0.5 * chamber.height)
+    draw_lines(axes, view, halfway[chamber.tags[row] == TAG_WALL], BLACK, 0.7)
+    face = chamber.triangles[chamber.tags == TAG_SONOTRODE]
+    draw_lines(axes, view, chamber.vertices[border_edges(face)][:, :, :2], SONOTRODE, 1.1)
+    (left, bottom), (right, top) = view.place([view.low, view.high])
+    x, y = view.place([0.0, 0.0])
+    is_upright = False
+    for name, plane in zip("AB", planes, strict=False):
+        at_x, at_y = view.place([plane.at, plane.at])
+        beside = plain(round(abs(plane.at), 1)) if abs(plane.at) > OFF_AXIS else ""
+        if plane.right == 0:
+            across_line(axes, (left - 3.0, at_y), (right + 3.0, at_y), name=name)
+            ends = (left, min(y, at_y)), (left, max(y, at_y))
+            if beside:
+                dimension(axes, *ends, 8.5, beside, upright=True)
+        else:
+            across_line(axes, (at_x, bottom - 3.0), (at_x, top + 3.0), name=name)
+            ends = (min(x, at_x), top), (max(x, at_x), top)
+            if beside:
+                dimension(axes, *ends, -3.5, beside)
+            is_upright = True
+    if len(planes) == 1:  # the other axis, and the length that the section does not show
+        across = planes[0].right
+        if across == 0:
+            across_line(axes, (x, bottom - 1.0), (x, top + 1.0))
+        else:
+            across_line(axes, (left - 1.0, y), (right + 1.0, y))
+        length = float((view.high - view.low)[1 - across])
+        text = with_limits(plain(length), length, limits, ("width_mm", "length_mm")[across])
+        if len(face_size_mm(chamber)) > 1 and across == 0:
+            dimension(axes, (right, bottom), (right, top), -9.5, text, upright=True)
+        elif len(face_size_mm(chamber)) > 1:
+            dimension(axes, (left, bottom), (right, bottom), 9.5, text)
+    label(axes, left, top + (6.5 if is_upright else 2.5), "plan: x to the right, y up")
+
+
+def draw_face(axes: Axes, chamber: Chamber, view: View, face: Face) -> list[str]:
+    """Draw the joints between blocks on the floor, and the rim of a face that goes beyond it.
+
+    Return what was drawn, in words.
+    """
+    from matplotlib.patches import Rectangle
+    from matplotlib.path import Path
+    from matplotlib.transforms import Bbox
+
+    floor = chamber.triangles[chamber.tags == TAG_SONOTRODE]
+    area = inside(1e3 * chamber.vertices[border_edges(floor)][:, :, :2])
+    assert area is not None
+    in_view = type(area)(view.place(area.vertices), area.codes)
+    look: dict[str, Any] = {"ls": (0, (6, 2)), "lw": 0.8}
+    for axis, places in enumerate(face.joints_mm):
+        for at in places:
+            ends = np.array([view.low, view.high])
+            ends[:, axis] = at
+            (line,) = axes.plot(*view.place(ends).T, color=SONOTRODE, **look)
+            line.set_clip_path(in_view, axes.transData)
+    found = ["the joints of the floor's blocks"] if face.count > 1 else []
+    if (np.array(face.sides_mm) > np.ptp(area.vertices, axis=0) + WIDER).any():
+        rim = view.place(1e3 * face.outline[[*range(len(face.outline)), 0]])
+        low, high = view.place(np.array([view.low, view.high])) + np.array(FREE)
+        if Path(rim).intersects_bbox(Bbox([low, high]), filled=False):
+            (line,) = axes.plot(*rim.T, color=SONOTRODE, zorder=0.5, **look)  # below words
+            line.set_clip_path(Rectangle(tuple(low), *(high - low), transform=axes.transData))
+            found.append("the sonotrode's rim")
+    return found

@@ -1,0 +1,200 @@
+"""Draw the section of a chamber with what holds its part, and its dimensions."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chamberopt.chamber.fixture import size_in_words
+from chamberopt.common.number_text import typeset_plain as plain
+from chamberopt.design.shape_surface import TAG_SONOTRODE, TAG_WALL
+from chamberopt.pictures.charts.colours import BLACK, BLUE, DARK_GREY, FIXTURE_COLOURS, SONOTRODE
+from chamberopt.pictures.drawing.arrangement import FACE
+from chamberopt.pictures.drawing.cuts import cut, face_size_mm, inside
+from chamberopt.pictures.drawing.dimensions import (
+    SHORT,
+    Limits,
+    across_line,
+    dimension,
+    with_limits,
+)
+from chamberopt.pictures.drawing.view import LABEL, PART, View, draw_lines, fill, label
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from chamberopt.chamber.build import Chamber
+
+WIDER = 0.1  # mm: a cavity that is wider than its sonotrode by more has its own dimension
+BEYOND = 0.1  # mm on paper that a part goes on at least where it is broken off
+BREAK, WAVE = 0.5, 3.0  # mm, height and length of the waves of a line where the part is broken off
+# mm on paper: jaws that hold the part outside begin so far from the wall, with so much of it beyond
+# them, and are so long and thick.
+JAWS_FROM, JAWS_LONG, JAWS_THICK = 2.5, 4.0, 2.0
+# They are drawn where the part's sides are parallel, at so many places, within so many mm on paper.
+JAW_PLACES, JAWS_OFF = 5, 0.2
+ROOM = "#e8f1f7"
+
+
+def draw_section(
+    axes: Axes, chamber: Chamber, view: View, at: float, name: str, limits: Limits
+) -> bool:
+    """Draw a section. Return whether jaws are in it, which hold the part outside.
+
+    Args:
+        at: place of the section's plane [mm].
+        name: letter of the section.
+        limits: those of draw_chamber.
+    """
+    other = 1 - view.right
+    side = ("length_mm", "width_mm")[view.right]
+    lines, row = cut(chamber.vertices, chamber.triangles, other, 1e-3 * at)
+    own, _ = cut(chamber.part.vertices, chamber.part.triangles, other, 1e-3 * at)
+    window = view.window(axes)
+    fill(axes, view, lines, window, facecolor=ROOM, lw=0.0)
+    fill(axes, view, own, window, facecolor=PART, edgecolor=DARK_GREY, hatch="////", lw=0.5)
+    _draw_breaks(axes, view, own)
+    has_jaws = "holder" not in chamber.fixtures and _draw_jaws(axes, view, own)
+    tags, target = chamber.tags[row], chamber.on_target[row]
+    draw_lines(axes, view, lines[tags == TAG_WALL], BLACK, 1.1)
+    draw_lines(axes, view, lines[tags > TAG_WALL], SONOTRODE, 2.5)
+    draw_lines(axes, view, lines[target], BLUE, 2.0)
+    _draw_fixtures(axes, chamber, view, 1e-3 * at)
+    (axis_at, y), (_, top) = view.place([[0.0, 0.0], [0.0, view.high[1]]])
+    above = top + view.outside[1]
+    across_line(axes, (axis_at, y - FACE - 1.0), (axis_at, above + 1.0))
+    words = f"{name}–{name}: {'xy'[view.right]} to the right, z up"
+    label(axes, view.corner[0], above + 2.5, words)
+    # The sonotrode is a band below its mean face, at z = 0.
+    face_wide = 0.0
+    face = 1e3 * lines[tags == TAG_SONOTRODE][..., 0]
+    if face.size:
+        x1, x2 = view.place([[face.min(), 0.0], [face.max(), 0.0]])[:, 0]
+        look: Any = {"facecolor": "white", "edgecolor": SONOTRODE, "hatch": "xxxx", "lw": 1.0}
+        axes.fill_between([x1, x2], y - FACE, y, **look)
+        size = face_size_mm(chamber)
+        face_wide = size[0] if len(size) == 1 else float(np.ptp(face))
+        text = f"Ø {plain(face_wide)}" if len(size) == 1 else plain(face_wide)
+        text = with_limits(text, face_wide, limits, "diameter_mm", side)
+        if len(size) == 1:  # the plane may cut a round face beside its axis
+            x1, x2 = view.place([[-0.5 * face_wide, 0.0], [0.5 * face_wide, 0.0]])[:, 0]
+        dimension(axes, (x1, y - FACE), (x2, y - FACE), 4.0, text)
+    wide = float((view.high - view.low)[0])
+    if wide > face_wide + WIDER:
+        low, high = view.place([[view.low[0], 0.0], [view.high[0], 0.0]])[:, 0]
+        text = with_limits(plain(wide), wide, limits, side)
+        dimension(axes, (low, y - FACE), (high, y - FACE), 8.5, text)
+    lowest = 1e3 * chamber.lowest_of_part
+    left, low_at = view.place([view.low[0], lowest]) - np.array([view.outside[0], 0.0])
+    right = view.place(view.high)[0] + view.outside[0]
+    text = with_limits(plain(lowest), lowest, limits, "sonotrode_distance_mm")
+    dimension(axes, (left, y), (left, low_at), 4.5, text, upright=True)
+    text = with_limits(plain(view.high[1]), float(view.high[1]), limits, "height_mm")
+    dimension(axes, (right, y), (right, top), -4.5, text, upright=True)
+    return has_jaws
+
+
+def _draw_breaks(axes: Axes, view: View, lines: np.ndarray) -> None:
+    """Draw a wave wherever a part is broken off, as it goes on beyond what is drawn of it.
+
+    Args:
+        lines: lines of the part's section, (k, 2, 2) [m].
+    """
+    sides, above = view.outside
+    low, high = view.place([view.low, view.high])
+    ends = view.place(1e3 * lines)
+    for axis, edge, way in (
+        (0, low[0] - sides, -BEYOND),
+        (0, high[0] + sides, BEYOND),
+        (1, high[1] + above, BEYOND),
+    ):
+        places = _crossings(ends, axis, edge, way)
+        for start, end in places[: len(places) // 2 * 2].reshape(-1, 2):
+            along = np.linspace(start, end, max(9, int(8.0 * (end - start) / WAVE)))
+            wave = edge + BREAK * np.sin(2.0 * np.pi * (along - start) / WAVE)
+            x, y = (wave, along) if axis == 0 else (along, wave)
+            axes.plot(x, y, color=BLACK, lw=0.6)
+
+
+def _draw_jaws(axes: Axes, view: View, lines: np.ndarray) -> bool:
+    """Draw jaws at both sides of a part, wherever it stands far enough out of the chamber.
+
+    There its sides have to be parallel. Return whether there are any jaws.
+
+    Args:
+        lines: lines of the part's section, (k, 2, 2) [m].
+    """
+    from matplotlib.patches import Rectangle
+
+    (sides, above), has_jaws = view.outside, False
+    low, high = view.place([view.low, view.high])
+    ends = view.place(1e3 * lines)
+    beyond = ends.min(axis=(0, 1)), ends.max(axis=(0, 1))
+    ways = (0, low[0], -1.0, sides), (0, high[0], 1.0, sides), (1, high[1], 1.0, above)
+    for axis, wall, way, drawn in ways:
+        stands_out = way * (beyond[int(way > 0.0)][axis] - wall)
+        if min(drawn, stands_out) < JAWS_FROM + JAWS_LONG:
+            continue
+        start = wall + way * JAWS_FROM
+        zone = np.linspace(start, start + way * JAWS_LONG, JAW_PLACES)
+        crossed = [_crossings(ends, axis, place) for place in zone]
+        if not all(map(len, crossed)):
+            continue
+        edges = [(float(one[0]), float(one[-1])) for one in crossed]
+        if np.ptp(edges, axis=0).max() > JAWS_OFF:
+            continue
+        # Sides beyond a line where the part is broken off are not drawn.
+        shown = (-math.inf, high[1] + above) if axis == 0 else (low[0] - sides, high[0] + sides)
+        if edges[0][0] < shown[0] - JAWS_OFF or edges[0][1] > shown[1] + JAWS_OFF:
+            continue
+        has_jaws = True
+        for edge, outwards in zip(edges[0], (-1.0, 1.0), strict=True):
+            corner = min(start, start + way * JAWS_LONG), min(edge, edge + outwards * JAWS_THICK)
+            size = JAWS_LONG, JAWS_THICK
+            x, wide = (corner, size) if axis == 0 else (corner[::-1], size[::-1])
+            look: Any = {"facecolor": "white", "edgecolor": BLACK, "hatch": "\\\\\\\\", "lw": 0.7}
+            axes.add_patch(Rectangle(x, *wide, **look))
+    return has_jaws
+
+
+def _crossings(ends: np.ndarray, axis: int, place: float, beyond: float = 0.0) -> np.ndarray:
+    """Return where lines cross a place along an axis of the page, in order, (k,) [mm].
+
+    Args:
+        ends: of the lines on the page, (n, 2, 2) [mm].
+        beyond: how far beyond that place a line has to go on to count [mm].
+    """
+    one, two = ends[:, 0], ends[:, 1]
+    crossing = (one[:, axis] > place + beyond) != (two[:, axis] > place + beyond)
+    one, two = one[crossing], two[crossing]
+    share = (place - one[:, axis]) / (two - one)[:, axis]
+    return np.sort((one + share[:, None] * (two - one))[:, 1 - axis])
+
+
+def _draw_fixtures(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
+    """Draw holder and mask in the section, each with its name and size.
+
+    Args:
+        at: place of the section's plane [m].
+    """
+    window = view.window(axes)
+    for name, one in chamber.fixtures.items():
+        lines, _ = cut(one.vertices, one.triangles, 1 - view.right, at)
+        look: Any = {"facecolor": FIXTURE_COLOURS[name], "edgecolor": BLACK, "lw": 0.7}
+        fill(axes, view, lines, window, hatch="....", **look)
+        if len(lines):
+            (left, low), (right, high) = view.place(
+                1e3 * np.array([lines.min(axis=(0, 1)), lines.max(axis=(0, 1))])
+            )
+            middle = 0.5 * (left + right), 0.5 * (low + high)
+            area = inside(1e3 * lines)
+            size = size_in_words(one.kind, [1e3 * side for side in one.size], unit="")
+            text = f"{name}\n{size}".strip()
+            style: Any = {"size": 5.0, "va": "center", "bbox": LABEL}
+            in_body = area is not None and area.contains_point(view.chamber_point(middle))
+            if in_body and right - left > SHORT:
+                axes.text(middle[0], middle[1], text, ha="center", **style)
+            else:
+                axes.text(right + 1.0, middle[1], text, ha="left", **style)
