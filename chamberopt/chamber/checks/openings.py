@@ -23,6 +23,7 @@ from chamberopt.geometry.triangles import (
     sides_of,
     unit_vectors,
 )
+from sim_core import computed_once
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 
 THIN = 5e-5  # m: sides of openings below it are none
+EDGE = 5e-4  # m: narrower openings are none to be cut, as the wall ends on the part
 BEND_DEG = 30.0  # walls that turn by less into each other are one, as facets of a cylinder
 LEAST_WAY = 0.05  # length of the mean unit normal below which a wall looks no way
 # Mean cosine between the way to the middle and the normals of the part round a piece of the wall,
@@ -113,7 +115,7 @@ def _points_of_rim(opening: Opening) -> np.ndarray:
     steps = int(np.ceil(np.linalg.norm(end - start, axis=1).max() / RIM_STEP))
     shares = np.linspace(0.0, 1.0, steps + 1)[:, None, None]
     flat = (start + shares * (end - start)).reshape(-1, 2)
-    return np.asarray(opening.place + flat @ _frame(opening.wall, np.array(opening.way)))
+    return np.asarray(opening.place + flat @ axes_along(opening.wall, np.array(opening.way)))
 
 
 class Joint(NamedTuple):
@@ -207,6 +209,7 @@ def _on_fixtures(chamber: Chamber) -> np.ndarray:
     return fixed
 
 
+@computed_once(4)
 def find_openings(chamber: Chamber) -> list[Opening]:
     """Return the openings of a chamber's walls through which the part goes out, the largest first.
 
@@ -288,7 +291,7 @@ def _opening(chamber: Chamber, wall: str, own: Joint) -> Opening | None:
     if np.linalg.norm(out) < LEAST_WAY:
         return None
     out /= np.linalg.norm(out)
-    sides = (points - middle) @ _frame(wall, out).T
+    sides = (points - middle) @ axes_along(wall, out).T
     low, high = sides.min(axis=0), sides.max(axis=0)
     outline = (sides - 0.5 * (low + high)).reshape(-1, 2, 2)
     wide, tall = (high - low).tolist()
@@ -298,7 +301,7 @@ def _opening(chamber: Chamber, wall: str, own: Joint) -> Opening | None:
     return Opening(wall, (wide, tall), (x, y, z), beyond, (u, v, w), form, outline)
 
 
-def _frame(wall: str, out: np.ndarray) -> np.ndarray:
+def axes_along(wall: str, out: np.ndarray) -> np.ndarray:
     """Return the two axes along a wall in which its openings are given, (2, 3).
 
     Args:
@@ -346,7 +349,7 @@ def _crosses_wall(chamber: Chamber, one: Opening, own: Joint, on_wall: np.ndarra
     if len(ends) != 2:
         return False
     out = np.array(one.way)
-    frame = _frame(one.wall, out)
+    frame = axes_along(one.wall, out)
     flat = np.abs((chamber.vertices[on_wall] - one.place) @ out) < AS_CUT
     points = chamber.vertices[on_wall[flat]] if flat.any() else ends
     edge = MultiPoint(points @ frame.T).convex_hull.boundary
@@ -365,7 +368,7 @@ def _wider(
         on_wall: vertices of the wall, (n,).
     """
     out = np.array(one.way)
-    frame = np.vstack([_frame(one.wall, out), out])
+    frame = np.vstack([axes_along(one.wall, out), out])
     corners = (chamber.vertices[on_wall] - one.place) @ frame.T
     corners = corners[np.abs(corners[:, 2]) < AS_CUT]
     rim = (chamber.vertices[own.ends.reshape(-1)] - one.place) @ frame.T

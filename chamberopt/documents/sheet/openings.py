@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.checks.openings import PLATE, thin_ribs
+from chamberopt.chamber.checks.openings import EDGE, PLATE, thin_ribs
 from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.fixture import plugs_in_words, size_in_words
 from chamberopt.documents.sheet.rows import MOST_ROWS, AsBuilt, Row, first_rows
@@ -19,9 +19,8 @@ if TYPE_CHECKING:
     from chamberopt.results.load import Result
 
 SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wall is named by it
-# m: narrower openings are none, and a wall ends on the part; jaws take what stands out so far;
-# through one opening alone, in a thin wall at least.
-EDGE, CLAMPED, SHORT = 5e-4, 3e-3, 15e-3
+# m: jaws take what stands out so far; through one opening alone, in a thin wall at least.
+CLAMPED, SHORT = 3e-3, 15e-3
 CLAMP = "clamp it there"
 GUIDED = "guide it there in a bushing, stopped along its axis"  # of a part that turns
 THROUGH = "; it goes on through the wall, fixed there, or in bearings and sealed"

@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 
 RASTER = 200  # dots an inch, for the part in the plan
 LEGEND = (
-    "dimensions in mm, without a tolerance by ISO 2768-m. Blue: target, in the plan also where it "
-    "is hidden. Hatched or grey: part. Orange: sonotrode."
+    "inside dimensions in mm, without a tolerance by ISO 2768-m. Blue: target, in the plan also "
+    "where it is hidden. Grey: part. Orange: sonotrode. White: walls and lid, as thick as the shop "
+    "chooses."
 )
 
 
@@ -62,21 +63,21 @@ def draw_chamber(
     middle = top - 0.5 * (needs[1] - ABOVE - BELOW - deep if is_below else size[1])
     x = left + 0.5 * (size[0] - needs[0])
     tall, under = scale * (high - low)[2], x + BESIDE
-    for name, plane, more in zip("AB", planes, outside, strict=False):
+    for number, (plane, more) in enumerate(zip(planes, outside, strict=True)):
         axis = np.array([plane.right, 2])
-        corner = np.array([x + BESIDE + more[0], middle - 0.5 * (tall + more[1]) + 1.0])
+        corner = np.array([x + BESIDE + more[0], middle - 0.5 * (tall + more[2]) + 1.0])
         view = View(plane.right, scale, corner, low[axis], high[axis], more)
-        has_jaws |= draw_section(axes, chamber, view, plane.at, name, limits)
-        x = corner[0] + scale * (high - low)[plane.right] + more[0] + BESIDE
+        has_jaws |= draw_section(axes, chamber, view, planes, number, limits)
+        x = corner[0] + scale * (high - low)[plane.right] + more[1] + BESIDE
         if plane.right == 0:
             under = corner[0]
     corner = np.array([under if is_below else x + BESIDE, of_plan - 0.5 * deep + 1.0])
-    view = View(0, scale, corner, low[:2], high[:2], np.zeros(2))
+    view = View(0, scale, corner, low[:2], high[:2], np.zeros(3))
     draw_plan(axes, chamber, view, planes, limits)
     dashed = [] if face is None else draw_face(axes, chamber, view, face)
     text = scale_in_words(scale)
     what = "Section A–A" if len(planes) == 1 else "Sections A–A and B–B"
-    jaws = ", white and hatched: jaws" if has_jaws else ""
+    jaws = ", white and crossed: jaws" if has_jaws else ""
     dashes = f", dashed: {' and '.join(dashed)}" if dashed else ""
     return f"{what} and plan, scale {text}{dashes}{jaws}"
 

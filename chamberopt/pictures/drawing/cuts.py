@@ -14,6 +14,7 @@ from sim_core import computed_once
 if TYPE_CHECKING:
     from matplotlib.path import Path
     from shapely import Point
+    from shapely.geometry.base import BaseGeometry
 
     from chamberopt.chamber.build import Chamber
 
@@ -196,23 +197,35 @@ def cut(
     return lines, cut_ones
 
 
-def inside(lines: np.ndarray) -> Path | None:
-    """Return the areas inside the outlines of closed bodies, which may overlap.
+def inside(lines: np.ndarray) -> BaseGeometry:
+    """Return the areas inside the outlines (k, 2, 2) of closed bodies, which may overlap."""
+    import shapely
 
-    None if there are no lines.
+    apart = lines[(lines[:, 0] != lines[:, 1]).any(axis=1)]
+    if not len(apart):
+        return shapely.Polygon()
+    crossing_at_ends = shapely.node(shapely.multilinestrings(shapely.linestrings(apart)))
+    faces = shapely.get_parts(shapely.polygonize([crossing_at_ends]))
+    return shapely.union_all([
+        face for face in faces if _turns_around(apart, shapely.point_on_surface(face))
+    ])  # fmt: skip
+
+
+def outline_path(area: BaseGeometry) -> Path | None:
+    """Return the outlines of an area as one path, or None of an empty one.
+
+    Its holes go round in the other sense.
     """
     import shapely
     from matplotlib.path import Path
 
-    apart = lines[(lines[:, 0] != lines[:, 1]).any(axis=1)]
-    if not len(apart):
-        return None
-    crossing_at_ends = shapely.node(shapely.multilinestrings(shapely.linestrings(apart)))
-    rings = []
-    for face in shapely.get_parts(shapely.polygonize([crossing_at_ends])):
-        if _turns_around(apart, shapely.point_on_surface(face)):
-            whole = shapely.geometry.polygon.orient(face)
-            rings += [np.asarray(ring.coords) for ring in (whole.exterior, *whole.interiors)]
+    pieces = [one for one in shapely.get_parts(area) if isinstance(one, shapely.Polygon)]
+    rings = [
+        np.asarray(ring.coords)
+        for one in map(shapely.geometry.polygon.orient, pieces)
+        if not one.is_empty
+        for ring in (one.exterior, *one.interiors)
+    ]
     return Path.make_compound_path(*(Path(one, closed=True) for one in rings)) if rings else None
 
 

@@ -18,18 +18,27 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 Limits = Mapping[str, tuple[float, float, float]]  # value, least and largest value [mm] by key
 SIZE, WIDTH = 7.0, 0.4  # pt, of the text and of the lines
-SHORT = 9.0  # mm: a shorter dimension has its arrows and its text outside
+SHORT = 9.0  # mm: a shorter dimension has its arrows outside
 STUB = 3.5  # mm, of arrows outside
+# mm, width of a letter, about, and of the arrows and the line beside a text that breaks it
+LETTER, ARROWS = 1.25, 5.0
 
 
 def dimension(
-    axes: Axes, start: Point, end: Point, away: float, text: str, upright: bool = False
+    axes: Axes,
+    start: Point,
+    end: Point,
+    away: float,
+    text: str,
+    upright: bool = False,
+    before: bool = False,
 ) -> None:
     """Draw a dimension: the horizontal or, if upright, the vertical distance of two points.
 
     Args:
         away: distance of the dimension line below the points, or left of the points if upright.
-        text: text at the line.
+        text: text at the line, or behind it where that is short.
+        before: before a short line, to the left or below, not behind it.
     """
 
     def turn(x: float, y: float) -> Point:
@@ -44,20 +53,19 @@ def dimension(
             lw=WIDTH,
         )
     arrow = {"lw": WIDTH, "color": DARK_GREY, "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 5.0}
+    middle, stub = x2 - x1 >= max(SHORT, LETTER * len(text) + ARROWS), 0.0
     if x2 - x1 >= SHORT:
         ends = [(x1, x2, "<|-|>")]
-        place = 0.5 * (x1 + x2)
     else:
-        ends = [(x1 - STUB, x1, "-|>"), (x2 + STUB, x2, "-|>"), (x1, x2, "-")]
-        place = x2 + STUB + 1.0
+        ends, stub = [(x1 - STUB, x1, "-|>"), (x2 + STUB, x2, "-|>"), (x1, x2, "-")], STUB
+    place = 0.5 * (x1 + x2) if middle else x1 - stub - 1.0 if before else x2 + stub + 1.0
     for a, b, style in ends:
         arrowed = {**arrow, "arrowstyle": style}
         axes.annotate("", turn(b, line), turn(a, line), arrowprops=arrowed, annotation_clip=False)
     inline = {"fc": "white", "ec": "none", "pad": 0.6}
-    middle = x2 - x1 >= SHORT
     x, y = turn(place, line)
-    ha = "center" if middle or upright else "left"
-    va = "bottom" if upright and not middle else "center"
+    ha = "center" if middle or upright else "right" if before else "left"
+    va = "center" if middle or not upright else "top" if before else "bottom"
     rotation = 90.0 if upright else 0.0
     axes.text(x, y, text, size=SIZE, ha=ha, va=va, rotation=rotation, bbox=inline, parse_math=False)
 

@@ -12,6 +12,7 @@ from chamberopt.common.number_text import typeset_plain as plain
 from chamberopt.geometry.outline import fitted_circle
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY
 from chamberopt.pictures.drawing.arrangement import BELOW, BESIDE, SCALES, scale_in_words
+from chamberopt.pictures.drawing.cuts import inside
 from chamberopt.pictures.drawing.dimensions import SIZE, WIDTH, Point, dimension
 from chamberopt.pictures.drawing.view import PART, View, draw_lines, fill
 
@@ -63,11 +64,11 @@ def _draw_opening(axes: Axes, one: Opening, corner: Point, scale: float) -> None
     """Draw the outline of an opening above and right of a corner on the page [mm]."""
     assert one.outline is not None
     half = 500.0 * np.array(one.size)
-    view = View(0, scale, np.array(corner), -half, half, np.zeros(2))
+    view = View(0, scale, np.array(corner), -half, half, np.zeros(3))
     edges = _closing(one.outline)
     closed = np.concatenate([one.outline, edges])
     look: Any = {"facecolor": PART, "edgecolor": DARK_GREY, "hatch": "////", "lw": 0.0}
-    fill(axes, view, closed, view.window(axes), **look)
+    fill(axes, view, inside(1e3 * closed), view.window(axes), **look)
     draw_lines(axes, view, one.outline, BLACK, 1.1)
     for line in view.place(1e3 * edges):
         axes.plot(*line.T, color=BLACK, lw=0.6, ls=(0, (4, 3)))
@@ -75,12 +76,12 @@ def _draw_opening(axes: Axes, one: Opening, corner: Point, scale: float) -> None
     wide, tall = (plain(round(float(2.0 * side), 1)) for side in half)
     dimension(axes, (x1, y1), (x2, y1), 5.0, wide)
     dimension(axes, (x1, y1), (x1, y2), 5.0, tall, upright=True)
-    corners, arc = _corners(one.outline)
+    corners, _ = _corners(one.outline)
     for k, (start, far) in enumerate(((x1, y2), (y1, x2))):
         places = np.unique(np.round(1e3 * corners[:, k] + half[k], 1))
         places = places[(places > ENDS) & (places < 2.0 * half[k] - ENDS)]  # dimensioned already
         _ordinates(axes, places, start, far, scale, upright=k == 1)
-    if len(arc) and (circle := _circle(arc)) is not None:
+    if (circle := round_of(one.outline)) is not None:
         middle, radius = circle
         ((x, y),) = view.place([1e3 * middle])
         axes.text(
@@ -109,12 +110,15 @@ def _corners(outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return corners, outline[is_arc]
 
 
-def _circle(arc: np.ndarray) -> tuple[np.ndarray, float] | None:
-    """Return middle and radius of the circle on which arcs lie, None if they lie on no one circle.
+def round_of(outline: np.ndarray) -> tuple[np.ndarray, float] | None:
+    """Return middle (2,) and radius [m] of the circle on which all arcs of an outline lie, if any.
 
     Args:
-        arc: sides (k, 2, 2) [m].
+        outline: directed sides (k, 2, 2) [m].
     """
+    _, arc = _corners(outline)
+    if not len(arc):
+        return None
     middle, radius = fitted_circle(arc.reshape(-1, 2))
     off = np.abs(np.linalg.norm(arc.reshape(-1, 2) - middle, axis=1) - radius).max()
     length = np.linalg.norm(arc[:, 1] - arc[:, 0], axis=1).sum()

@@ -11,10 +11,12 @@ from chamberopt.common.number_text import typeset_plain as plain
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import border_edges
 from chamberopt.pictures.charts.colours import BLACK, KINDS, SONOTRODE
-from chamberopt.pictures.drawing.cuts import SectionPlane, cut, face_size_mm, inside
+from chamberopt.pictures.drawing.centres import OFF, centres, distinct, gaps
+from chamberopt.pictures.drawing.cuts import SectionPlane, cut, face_size_mm, inside, outline_path
 from chamberopt.pictures.drawing.dimensions import Limits, across_line, dimension, with_limits
 from chamberopt.pictures.drawing.section import WIDER
 from chamberopt.pictures.drawing.view import PART, View, draw_lines, label
+from chamberopt.pictures.drawing.walls import draw_walls
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,6 +26,9 @@ if TYPE_CHECKING:
 
 # mm on paper, lower left and upper right of what is round a plan without words and dimensions
 FREE = (-8.0, -8.0), (8.0, 2.0)
+# mm on paper from the room to the first dimension of a place, and to each further one, and how many
+# there are along each axis at most.
+PLACES, ROWS, MOST_PLACES = 5.3, 4.2, 2
 OFF_AXIS = 0.05  # mm: a section that is farther beside the axis has its place dimensioned
 TARGET = KINDS["target"].colour
 
@@ -43,6 +48,7 @@ def draw_plan(
     draw_lines(axes, view, halfway[chamber.tags[row] == TAG_WALL], BLACK, 0.7)
     face = chamber.triangles[chamber.tags == TAG_SONOTRODE]
     draw_lines(axes, view, chamber.vertices[border_edges(face)][:, :, :2], SONOTRODE, 1.1)
+    draw_walls(axes, chamber, view, 2, 0.5 * chamber.height)
     (left, bottom), (right, top) = view.place([view.low, view.high])
     x, y = view.place([0.0, 0.0])
     is_upright = False
@@ -72,7 +78,30 @@ def draw_plan(
             dimension(axes, (right, bottom), (right, top), -9.5, text, upright=True)
         elif len(face_size_mm(chamber)) > 1:
             dimension(axes, (left, bottom), (right, bottom), 9.5, text)
-    label(axes, left, top + (6.5 if is_upright else 2.5), "plan: x to the right, y up")
+    _draw_places(axes, chamber, view)
+    label(axes, left, top + (6.6 if is_upright else 3.0), "plan: x to the right, y up")
+
+
+def _draw_places(axes: Axes, chamber: Chamber, view: View) -> None:
+    """Dimension where the part stands, and openings that are not in the middle, from a wall."""
+    corner = view.place(view.low)
+    for axis in (0, 1):
+        spans = gaps(chamber, axis)
+        wall = float(view.low[axis])
+        beside = [one.place[axis] for one in centres(chamber) if one.axis != axis]
+        ends = distinct([at for at in beside if abs(at) > OFF], [end for _, end in spans])
+        spans += [(wall, at) for at in ends]
+        for number, (low, high) in enumerate(spans[:MOST_PLACES]):
+            start, end = np.array([view.low, view.low])
+            start[axis], end[axis] = low, high
+            (x1, y1), (x2, y2) = view.place([start, end])
+            away = PLACES + number * ROWS
+            text = plain(round(high - low, 1))
+            if axis == 0:
+                dimension(axes, (x1, y1), (x2, y2), away, text, before=low == wall)
+            else:
+                x = corner[0] + view.scale * float((view.high - view.low)[0])
+                dimension(axes, (x, y1), (x, y2), -away, text, upright=True, before=low == wall)
 
 
 def draw_face(axes: Axes, chamber: Chamber, view: View, face: Face) -> list[str]:
@@ -85,7 +114,7 @@ def draw_face(axes: Axes, chamber: Chamber, view: View, face: Face) -> list[str]
     from matplotlib.transforms import Bbox
 
     floor = chamber.triangles[chamber.tags == TAG_SONOTRODE]
-    area = inside(1e3 * chamber.vertices[border_edges(floor)][:, :, :2])
+    area = outline_path(inside(1e3 * chamber.vertices[border_edges(floor)][:, :, :2]))
     assert area is not None
     in_view = type(area)(view.place(area.vertices), area.codes)
     look: dict[str, Any] = {"ls": (0, (6, 2)), "lw": 0.8}

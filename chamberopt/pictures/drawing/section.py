@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,8 +12,9 @@ from chamberopt.chamber.fixture import size_in_words
 from chamberopt.common.number_text import typeset_plain as plain
 from chamberopt.design.shape_surface import TAG_SONOTRODE, TAG_WALL
 from chamberopt.pictures.charts.colours import BLACK, BLUE, DARK_GREY, FIXTURE_COLOURS, SONOTRODE
-from chamberopt.pictures.drawing.arrangement import FACE
-from chamberopt.pictures.drawing.cuts import cut, face_size_mm, inside
+from chamberopt.pictures.drawing.arrangement import FACE, WALL
+from chamberopt.pictures.drawing.centres import centres, distinct
+from chamberopt.pictures.drawing.cuts import SectionPlane, cut, face_size_mm, inside
 from chamberopt.pictures.drawing.dimensions import (
     SHORT,
     Limits,
@@ -21,6 +23,7 @@ from chamberopt.pictures.drawing.dimensions import (
     with_limits,
 )
 from chamberopt.pictures.drawing.view import LABEL, PART, View, draw_lines, fill, label
+from chamberopt.pictures.drawing.walls import draw_walls
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,26 +38,39 @@ BREAK, WAVE = 0.5, 3.0  # mm, height and length of the waves of a line where the
 JAWS_FROM, JAWS_LONG, JAWS_THICK = 2.5, 4.0, 2.0
 # They are drawn where the part's sides are parallel, at so many places, within so many mm on paper.
 JAW_PLACES, JAWS_OFF = 5, 0.2
+JAWS = "xxxxxx"  # their hatch
+# mm on paper from the walls to the first dimension of a height, and to each further one.
+FIRST_ROW, ROWS = 4.0, 4.2
+CROSS = 4.0  # mm on paper, of the lines that cross in the middle of an opening
+MOST_CENTRES = 1  # heights of openings on each side of a section
 ROOM = "#e8f1f7"
 
 
 def draw_section(
-    axes: Axes, chamber: Chamber, view: View, at: float, name: str, limits: Limits
+    axes: Axes,
+    chamber: Chamber,
+    view: View,
+    planes: Sequence[SectionPlane],
+    number: int,
+    limits: Limits,
 ) -> bool:
     """Draw a section. Return whether jaws are in it, which hold the part outside.
 
     Args:
-        at: place of the section's plane [mm].
-        name: letter of the section.
+        planes: planes of all sections.
+        number: of this section among them, from 0.
         limits: those of draw_chamber.
     """
+    at, name = planes[number].at, "AB"[number]
     other = 1 - view.right
     side = ("length_mm", "width_mm")[view.right]
     lines, row = cut(chamber.vertices, chamber.triangles, other, 1e-3 * at)
     own, _ = cut(chamber.part.vertices, chamber.part.triangles, other, 1e-3 * at)
     window = view.window(axes)
-    fill(axes, view, lines, window, facecolor=ROOM, lw=0.0)
-    fill(axes, view, own, window, facecolor=PART, edgecolor=DARK_GREY, hatch="////", lw=0.5)
+    fill(axes, view, inside(1e3 * lines), window, facecolor=ROOM, lw=0.0)
+    draw_walls(axes, chamber, view, other, 1e-3 * at)
+    look: Any = {"facecolor": PART, "edgecolor": DARK_GREY, "hatch": "////", "lw": 0.5}
+    fill(axes, view, inside(1e3 * own), window, **look)
     _draw_breaks(axes, view, own)
     has_jaws = "holder" not in chamber.fixtures and _draw_jaws(axes, view, own)
     tags, target = chamber.tags[row], chamber.on_target[row]
@@ -63,7 +79,8 @@ def draw_section(
     draw_lines(axes, view, lines[target], BLUE, 2.0)
     _draw_fixtures(axes, chamber, view, 1e-3 * at)
     (axis_at, y), (_, top) = view.place([[0.0, 0.0], [0.0, view.high[1]]])
-    above = top + view.outside[1]
+    *sides, above = np.maximum(view.outside, WALL).tolist()
+    above += float(top)
     across_line(axes, (axis_at, y - FACE - 1.0), (axis_at, above + 1.0))
     words = f"{name}–{name}: {'xy'[view.right]} to the right, z up"
     label(axes, view.corner[0], above + 2.5, words)
@@ -72,7 +89,7 @@ def draw_section(
     face = 1e3 * lines[tags == TAG_SONOTRODE][..., 0]
     if face.size:
         x1, x2 = view.place([[face.min(), 0.0], [face.max(), 0.0]])[:, 0]
-        look: Any = {"facecolor": "white", "edgecolor": SONOTRODE, "hatch": "xxxx", "lw": 1.0}
+        look = {"facecolor": "white", "edgecolor": SONOTRODE, "hatch": "xxxx", "lw": 1.0}
         axes.fill_between([x1, x2], y - FACE, y, **look)
         size = face_size_mm(chamber)
         face_wide = size[0] if len(size) == 1 else float(np.ptp(face))
@@ -86,14 +103,52 @@ def draw_section(
         low, high = view.place([[view.low[0], 0.0], [view.high[0], 0.0]])[:, 0]
         text = with_limits(plain(wide), wide, limits, side)
         dimension(axes, (low, y - FACE), (high, y - FACE), 8.5, text)
-    lowest = 1e3 * chamber.lowest_of_part
-    left, low_at = view.place([view.low[0], lowest]) - np.array([view.outside[0], 0.0])
-    right = view.place(view.high)[0] + view.outside[0]
+    lowest, high = 1e3 * chamber.lowest_of_part, float(view.high[1])
     text = with_limits(plain(lowest), lowest, limits, "sonotrode_distance_mm")
-    dimension(axes, (left, y), (left, low_at), 4.5, text, upright=True)
-    text = with_limits(plain(view.high[1]), float(view.high[1]), limits, "height_mm")
-    dimension(axes, (right, y), (right, top), -4.5, text, upright=True)
+    total = with_limits(plain(high), high, limits, "height_mm")
+    heights = _draw_centres(axes, chamber, view, planes, [lowest, high])
+    for way, wall, out, rows in (
+        (-1, view.low, sides[0], [(lowest, text), *heights[-1]]),
+        (1, view.high, sides[1], [*heights[1], (high, total)]),
+    ):
+        x = view.place(wall)[0] + way * out
+        for number, (height, words) in enumerate(rows):
+            away = -way * (FIRST_ROW + number * ROWS)
+            end = x, view.place([0.0, height])[1]
+            dimension(axes, (x, y), end, away, words, upright=True)
     return has_jaws
+
+
+def _draw_centres(
+    axes: Axes, chamber: Chamber, view: View, planes: Sequence[SectionPlane], known: Sequence[float]
+) -> dict[int, list[tuple[float, str]]]:
+    """Draw the axes of holder and openings that go out sideways.
+
+    Return their heights [mm] with the words of their dimensions, to the left (-1) and right (1).
+    One that is seen from its end is dimensioned to the left, unless the other section has it.
+
+    Args:
+        known: heights that are dimensioned anyway [mm].
+    """
+    heights: dict[int, list[float]] = {-1: [], 1: []}
+    (low, _), (high, _) = view.place([view.low, view.high])
+    for one in centres(chamber):
+        z = one.place[2]
+        x, y = view.place([one.place[view.right], z])
+        if one.axis == view.right:
+            x = high if one.outwards > 0 else low
+            across_line(axes, (x - CROSS, y), (x + CROSS, y))
+            heights[one.outwards].append(z)
+        elif one.axis == 1 - view.right and one.axis not in [plane.right for plane in planes]:
+            across_line(axes, (low - WALL, y), (x + CROSS, y))
+            across_line(axes, (x, y - CROSS), (x, y + CROSS))
+            heights[-1].append(z)
+    found = {1: distinct(heights[1], known)}
+    found[-1] = distinct(heights[-1], [*known, *found[1]])
+    return {
+        side: [(one, plain(round(one, 1))) for one in several[:MOST_CENTRES]]
+        for side, several in found.items()
+    }
 
 
 def _draw_breaks(axes: Axes, view: View, lines: np.ndarray) -> None:
@@ -102,12 +157,12 @@ def _draw_breaks(axes: Axes, view: View, lines: np.ndarray) -> None:
     Args:
         lines: lines of the part's section, (k, 2, 2) [m].
     """
-    sides, above = view.outside
+    left, right, above = view.outside
     low, high = view.place([view.low, view.high])
     ends = view.place(1e3 * lines)
     for axis, edge, way in (
-        (0, low[0] - sides, -BEYOND),
-        (0, high[0] + sides, BEYOND),
+        (0, low[0] - left, -BEYOND),
+        (0, high[0] + right, BEYOND),
         (1, high[1] + above, BEYOND),
     ):
         places = _crossings(ends, axis, edge, way)
@@ -128,11 +183,11 @@ def _draw_jaws(axes: Axes, view: View, lines: np.ndarray) -> bool:
     """
     from matplotlib.patches import Rectangle
 
-    (sides, above), has_jaws = view.outside, False
+    (left, right, above), has_jaws = view.outside, False
     low, high = view.place([view.low, view.high])
     ends = view.place(1e3 * lines)
     beyond = ends.min(axis=(0, 1)), ends.max(axis=(0, 1))
-    ways = (0, low[0], -1.0, sides), (0, high[0], 1.0, sides), (1, high[1], 1.0, above)
+    ways = (0, low[0], -1.0, left), (0, high[0], 1.0, right), (1, high[1], 1.0, above)
     for axis, wall, way, drawn in ways:
         stands_out = way * (beyond[int(way > 0.0)][axis] - wall)
         if min(drawn, stands_out) < JAWS_FROM + JAWS_LONG:
@@ -146,7 +201,7 @@ def _draw_jaws(axes: Axes, view: View, lines: np.ndarray) -> bool:
         if np.ptp(edges, axis=0).max() > JAWS_OFF:
             continue
         # Sides beyond a line where the part is broken off are not drawn.
-        shown = (-math.inf, high[1] + above) if axis == 0 else (low[0] - sides, high[0] + sides)
+        shown = (-math.inf, high[1] + above) if axis == 0 else (low[0] - left, high[0] + right)
         if edges[0][0] < shown[0] - JAWS_OFF or edges[0][1] > shown[1] + JAWS_OFF:
             continue
         has_jaws = True
@@ -154,7 +209,7 @@ def _draw_jaws(axes: Axes, view: View, lines: np.ndarray) -> bool:
             corner = min(start, start + way * JAWS_LONG), min(edge, edge + outwards * JAWS_THICK)
             size = JAWS_LONG, JAWS_THICK
             x, wide = (corner, size) if axis == 0 else (corner[::-1], size[::-1])
-            look: Any = {"facecolor": "white", "edgecolor": BLACK, "hatch": "\\\\\\\\", "lw": 0.7}
+            look: Any = {"facecolor": "white", "edgecolor": BLACK, "hatch": JAWS, "lw": 0.7}
             axes.add_patch(Rectangle(x, *wide, **look))
     return has_jaws
 
@@ -179,21 +234,23 @@ def _draw_fixtures(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
     Args:
         at: place of the section's plane [m].
     """
+    import shapely
+
     window = view.window(axes)
     for name, one in chamber.fixtures.items():
         lines, _ = cut(one.vertices, one.triangles, 1 - view.right, at)
         look: Any = {"facecolor": FIXTURE_COLOURS[name], "edgecolor": BLACK, "lw": 0.7}
-        fill(axes, view, lines, window, hatch="....", **look)
+        area = inside(1e3 * lines)
+        fill(axes, view, area, window, hatch="....", **look)
         if len(lines):
             (left, low), (right, high) = view.place(
                 1e3 * np.array([lines.min(axis=(0, 1)), lines.max(axis=(0, 1))])
             )
             middle = 0.5 * (left + right), 0.5 * (low + high)
-            area = inside(1e3 * lines)
             size = size_in_words(one.kind, [1e3 * side for side in one.size], unit="")
             text = f"{name}\n{size}".strip()
             style: Any = {"size": 5.0, "va": "center", "bbox": LABEL}
-            in_body = area is not None and area.contains_point(view.chamber_point(middle))
+            in_body = area.contains(shapely.Point(view.chamber_point(middle)))
             if in_body and right - left > SHORT:
                 axes.text(middle[0], middle[1], text, ha="center", **style)
             else:

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.pictures.charts.colours import DARK_GREY
-from chamberopt.pictures.drawing.cuts import inside
+from chamberopt.pictures.drawing.cuts import outline_path
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.patches import Rectangle
     from numpy.typing import ArrayLike
+    from shapely.geometry.base import BaseGeometry
 
     from chamberopt.pictures.drawing.dimensions import Point
 
@@ -30,8 +31,8 @@ class View:
         scale: length on the page over length in the chamber.
         corner: lower left corner of the cavity on the page [mm].
         low, high: corners of the cavity in the chamber, (2,) [mm].
-        outside: drawn length of the part beyond the cavity, [left and right, above] on the page
-            [mm].
+        outside: drawn length of the part beyond the cavity to the left, to the right and above, on
+            the page, (3,) [mm].
     """
 
     right: int
@@ -54,24 +55,28 @@ class View:
         """Return the rectangle of the page that the view takes, at which drawings are cut off."""
         from matplotlib.patches import Rectangle
 
-        sides, above = self.outside
-        size = self.scale * (self.high - self.low) + np.array([2.0 * sides, above])
-        return Rectangle(
-            tuple(self.corner - np.array([sides, 0.0])), *size, transform=axes.transData
-        )
+        left, right, above = self.outside
+        size = self.scale * (self.high - self.low) + np.array([left + right, above])
+        corner = tuple(self.corner - np.array([left, 0.0]))
+        return Rectangle(corner, *size, transform=axes.transData)
 
 
-def fill(axes: Axes, view: View, lines: np.ndarray, window: Rectangle, **look: Any) -> None:
+def fill(
+    axes: Axes, view: View, area: BaseGeometry, window: Rectangle | None = None, **look: Any
+) -> None:
+    """Fill an area [mm] of the chamber, cut off at a rectangle of the page."""
     from matplotlib.patches import PathPatch
 
-    area = inside(1e3 * lines)
-    if area is not None:
-        patch = PathPatch(type(area)(view.place(area.vertices), area.codes), **look)
+    path = outline_path(area)
+    if path is not None:
+        patch = PathPatch(type(path)(view.place(path.vertices), path.codes), **look)
         axes.add_patch(patch)
-        patch.set_clip_path(window)
+        if window is not None:
+            patch.set_clip_path(window)
 
 
 def draw_lines(axes: Axes, view: View, lines: np.ndarray, colour: str, width: float) -> None:
+    """Draw lines (n, 2, 2) [m] of the chamber, of a width [pt]."""
     from matplotlib.collections import LineCollection
 
     if len(lines):
@@ -81,4 +86,5 @@ def draw_lines(axes: Axes, view: View, lines: np.ndarray, colour: str, width: fl
 
 
 def label(axes: Axes, x: float, y: float, text: str) -> None:
+    """Write the name of a view above and right of a place on the page [mm]."""
     axes.text(x, y, text, size=6.5, color=DARK_GREY, va="bottom", bbox=LABEL)

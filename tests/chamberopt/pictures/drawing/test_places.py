@@ -1,0 +1,82 @@
+"""Walls are drawn round the room, and what stands beside its middle has its place dimensioned."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from matplotlib.figure import Figure
+
+from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.pictures.drawing.arrangement import WALL, arrangement
+from chamberopt.pictures.drawing.centres import Centre, centres, distinct, gaps
+from chamberopt.pictures.drawing.chamber import draw_chamber
+from chamberopt.pictures.drawing.cuts import section_planes
+from chamberopt.pictures.drawing.walls import LID, WALLS
+from tests.helpers.synthetic import plate_design
+
+ROOM = {"shape": "box", "length_mm": 40, "width_mm": 30, "height_mm": 30}
+
+
+def room_with(
+    part: trimesh.Trimesh, folder: Path, offset_mm: tuple[float, float], **more: object
+) -> Chamber:
+    """A room of 40 x 30 x 30 mm, with the part 10 mm over the sonotrode and off the axis."""
+    part.export(folder / "part.stl")
+    below = {"direction": (0.0, 0.0, -1.0), "angle_deg": (0.0, 10.0)}
+    mesh = {"mesh": str(folder / "part.stl"), "unit": "mm", "offset_mm": offset_mm, "target": below}
+    chamber = {**ROOM, "sonotrode_distance_mm": 10}
+    return build_chamber(plate_design().changed({"part": mesh, "chamber": chamber, **more}))
+
+
+def texts_of(chamber: Chamber) -> tuple[list[str], dict[str, float]]:
+    """The texts of its drawing at 1:1, and the area of what has each hatch [mm²]."""
+    axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
+    draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0))
+    found: dict[str, float] = {}
+    for one in axes.patches:
+        if one.get_hatch():
+            rings = [ring.T for ring in one.get_path().to_polygons()]  # holes the other way round
+            area = 0.5 * sum(float(np.sum(x[:-1] * y[1:] - y[:-1] * x[1:])) for x, y in rings)
+            found[one.get_hatch()] = found.get(one.get_hatch(), 0.0) + area
+    return [one.get_text() for one in axes.texts], found
+
+
+def test_a_bar_through_a_side_wall_has_its_axis_and_its_end_dimensioned(tmp_path: Path) -> None:
+    """A bar of 6 mm along x, from x = -9 to 27 mm, 5 mm beside the axis of the room."""
+    chamber = room_with(trimesh.creation.box((36.0, 6.0, 6.0)), tmp_path, (9.0, 5.0))
+    (one,) = centres(chamber)
+    assert (one.axis, one.outwards) == (0, 1)
+    assert one.place == pytest.approx((20.0, 5.0, 13.0), abs=1e-6)
+    assert gaps(chamber, 0) == [pytest.approx((-20.0, -9.0))]
+    assert gaps(chamber, 1) == [pytest.approx((-15.0, 2.0))]
+    texts, area = texts_of(chamber)
+    assert {"13", "11", "17", "20"} <= {*texts}
+    # In both views the bar goes through the wall on the right.
+    ring = 2.0 * (43.0 + 30.0) * WALL
+    assert area[WALLS] == pytest.approx((60.0 - 6.0 - 6.0) * WALL + ring, rel=1e-3)
+    assert area[LID] == pytest.approx(43.0 * WALL, rel=1e-3)
+
+
+def test_what_is_in_the_middle_has_no_dimension_but_along_its_holder(tmp_path: Path) -> None:
+    cube = trimesh.creation.box((10.0, 10.0, 10.0))
+    held = {"holder": {"kind": "rod", "axis": (1.0, 0.0, 0.0), "diameter_mm": 4.0}}
+    chamber = room_with(cube, tmp_path, (0.0, 0.0), **held)
+    (one,) = centres(chamber)
+    assert one == Centre(0, 1, one.place)
+    assert one.place == pytest.approx((5.0, 0.0, 15.0), abs=1e-3)
+    assert gaps(chamber, 0) == [pytest.approx((-20.0, -5.0))]
+    assert gaps(chamber, 1) == []
+    assert distinct([3.0, 1.0, 3.02], known=[1.0]) == [3.0]
+
+
+def test_a_part_is_broken_off_before_a_hole_beyond_the_chamber(tmp_path: Path) -> None:
+    """A bar of 80 mm with a hole of 4 mm, from 5 mm outside on: 15 mm would be drawn of it."""
+    bar = trimesh.creation.box((80.0, 6.0, 6.0))
+    hole = trimesh.creation.cylinder(2.0, 10.0)
+    hole.apply_translation((27.0, 0.0, 0.0))
+    for part, right in ((bar, 15.0), (trimesh.boolean.difference([bar, hole]), 5.0)):
+        chamber = room_with(part, tmp_path, (0.0, 0.0))
+        found = arrangement(chamber, section_planes(chamber), (190.0, 70.0))
+        assert found.scale == 1.0
+        assert found.outside[0] == pytest.approx((15.0, right, 0.0), abs=0.3)
