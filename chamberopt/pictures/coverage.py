@@ -19,7 +19,7 @@ from chamberopt.results.vtp_files import size_text
 
 
 def draw_coverage(
-    folders: Sequence[str | Path], titles: Sequence[str], picture: str | Path
+    folders: Sequence[str | Path], titles: Sequence[str], picture: str | Path, columns: int = 3
 ) -> str | None:
     """Draw the coverage of one result, or of several below one another on one colour scale.
 
@@ -27,11 +27,12 @@ def draw_coverage(
         folders: results folders, each with arrays.npz.
         titles: a title for each result.
         picture: file to write, .png.
+        columns: views beside one another; further ones of a result are below them.
 
     Returns:
         None, or one line that says why there is no picture.
     """
-    job = {"folders": [str(one) for one in folders], "titles": list(titles)}
+    job = {"folders": [str(one) for one in folders], "titles": list(titles), "columns": columns}
     return draw_in_subprocess(render_coverage, job, picture)
 
 
@@ -57,7 +58,9 @@ def render_coverage(job: dict[str, Any]) -> None:
             add_edges(plotter, part.surface)
 
         panels = part_panels(add, part.inside, part.surface, chamber, views)
-        rows.append(Row(title, panels))
+        for first in range(0, len(panels), job["columns"]):
+            shown = panels[first : first + job["columns"]]
+            rows.append(Row("" if first else title, shown))
     legend = [*body_meanings(chambers), *colour_meanings(parts)]
     remarks = [f"part {size_text(parts[0].surface)}", SCATTER]
     write_page(job["picture"], rows, legend, coverage_bar(parts, limits), remarks)

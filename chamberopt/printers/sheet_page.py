@@ -7,7 +7,7 @@ further pages.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.checks.fillets import radii_of_target
-from chamberopt.chamber.checks.openings import find_openings, mounting
+from chamberopt.chamber.checks.openings import find_openings, mounting, part_is_ceiling
 from chamberopt.chamber.checks.strips import strip_of_target
 from chamberopt.chamber.checks.usual import usual_for_target
 from chamberopt.chamber.fixture import plugs_of
@@ -31,6 +31,7 @@ from chamberopt.documents.sheet import (
     drawn_openings,
     outlines_in_words,
     process_sheet,
+    reference_limits,
     slit_limits,
 )
 from chamberopt.peening.strip_holder import target_level_mm
@@ -75,6 +76,8 @@ CAPTION, ROW = 7.0, 8.0  # mm, of the caption, and of a row of the title block
 FIELDS = 6  # in a row of the title block
 FOOT = MARGIN + 2.0 * ROW + 3.0  # mm, where the content ends
 RED = "#C00000"
+VIEWS_A_ROW = 2  # of the picture of the coverage, where no outlines are below it on its page
+NO_COVERAGE = "No page shows the coverage by place: {}."
 COVERAGE = (
     "Share of the surface that is dented after the treatment time, simulated, in windows round "
     "each place. Look first where it is least."
@@ -84,9 +87,12 @@ MM_PER_PT = 25.4 / 72.0
 LEADING = 1.25  # height of a line over the size of its letters
 HINTED = 1.04  # width of a text on a screen, whose letters take whole pixels, over that on paper
 NAMES = 0.52  # share of a column's width that names may take at most
-MOST_LINES = 4  # lines of a text; a longer text ends in an ellipsis
+MOST_LINES = 4  # lines of a name in a heading; a longer one ends in an ellipsis
 MOST_REVISION = 20  # characters
-ALL_LINES = 40  # the same where a text must be whole, and may go on further pages
+
+
+Written = Callable[["Writer", float], float]
+"""Writes something from a height of the page on [mm], and returns that of its bottom."""
 
 
 class Writer:
@@ -95,8 +101,11 @@ class Writer:
     A Writer without axes writes nothing and only measures heights.
     """
 
-    def __init__(self, axes: Axes | None, size: float, most: int = MOST_LINES) -> None:
-        """Prepare to write letters of `size` [pt] on `axes`, and at most `most` lines of a text."""
+    def __init__(self, axes: Axes | None, size: float, most: int | None = None) -> None:
+        """Prepare to write letters of `size` [pt] on `axes`, and at most `most` lines of a text.
+
+        A text is written whole if `most` is None.
+        """
         self.axes, self.size, self.most = axes, size, most
 
     @property
@@ -169,16 +178,20 @@ class Writer:
 
     def table(self, table: Table, top: float) -> float:
         """Write a table with its head, as wide as the page. Return the bottom's height [mm]."""
-        y = top
-        for number, row in enumerate([table.head, *table.rows]):
-            x, ends = MARGIN, []
-            for text, width in zip(row, COLUMNS, strict=True):
-                ends.append(self.write(text, x, y, width - 2.0, bold=number == 0))
-                x += width
-            y = min(ends) - 0.35 * self.line
-            self.rule(MARGIN, y, INNER)
-            y -= 0.35 * self.line
+        y = self.table_row(table.head, top, bold=True)
+        for row in table.rows:
+            y = self.table_row(row, y)
         return y
+
+    def table_row(self, row: Sequence[str], top: float, bold: bool = False) -> float:
+        """Write a row of a table with a head, and a line below. Return the bottom's height [mm]."""
+        x, ends = MARGIN, []
+        for text, width in zip(row, COLUMNS, strict=True):
+            ends.append(self.write(text, x, top, width - 2.0, bold=bold))
+            x += width
+        y = min(ends) - 0.35 * self.line
+        self.rule(MARGIN, y, INNER)
+        return y - 0.35 * self.line
 
     def rule(self, x: float, y: float, width: float, colour: str = GREY) -> None:
         """Draw a thin horizontal line."""
@@ -187,11 +200,12 @@ class Writer:
 
 
 def broken(
-    text: str, width: float, size: float, bold: bool = False, most: int = MOST_LINES
+    text: str, width: float, size: float, bold: bool = False, most: int | None = None
 ) -> list[str]:
-    """Return a text broken into at most `most` lines no wider than `width` [mm].
+    """Return a text broken into lines no wider than `width` [mm].
 
-    A wider word is cut, and what is beyond the last line is replaced by an ellipsis.
+    A wider word is cut. If there may be at most `most` lines, what is beyond the last one is
+    replaced by an ellipsis.
     A number stays on a line with its interval and unit. A letter not in the font becomes "?".
     """
     lines, line = [], ""
@@ -215,7 +229,7 @@ def broken(
             lines.append(line)
             line = word
     lines.append(line)
-    if len(lines) <= most:
+    if most is None or len(lines) <= most:
         return lines
     last = lines[most - 1]
     while last and text_width(f"{last} …", size, bold) > width:
@@ -287,33 +301,36 @@ def write_sheet(
             [find_openings(step) for step in chamber.steps[1:]],
             target_level_mm(chamber),
             radii_of_target(design, part),
+            part_is_ceiling(chamber),
         )
         sheet = process_sheet(loaded, built, revision)
-        limits, face = slit_limits(loaded) | chamber_limits(loaded), design.sonotrode.face
+        limits = slit_limits(loaded) | chamber_limits(loaded) | reference_limits(loaded, openings)
+        outlines = drawn_openings(built)
         pages = draw_sheet(
             sheet,
             chamber,
             limits,
-            face,
-            drawn_openings(built),
-            coverage_map(loaded.folder),
+            design.sonotrode.face,
+            outlines,
+            coverage_map(loaded.folder, 3 if outlines else VIEWS_A_ROW),
             1e3 * clear,
         )
         _save(path, pages, sheet.name)
     return path, sheet
 
 
-def coverage_map(folder: Path) -> np.ndarray | None:
-    """Return the picture of a result's coverage, drawn anew, or None if it cannot be drawn here.
+def coverage_map(folder: Path, columns: int) -> np.ndarray | str:
+    """Return the picture of a result's coverage, drawn anew, or why it cannot be drawn here.
 
-    The picture in the folder may not be that of the result, as it has no digest.
+    It has so many columns of views. The picture in the folder may not be that of the result, as it
+    has no digest.
     """
     from matplotlib.image import imread
 
     with private_folder() as own:
         picture = Path(own) / "coverage.png"
-        if draw_coverage([folder], [""], picture) is not None:
-            return None
+        if reason := draw_coverage([folder], [""], picture, columns):
+            return reason.removeprefix(f"{picture.name} ").removeprefix("skipped: ")
         return np.asarray(imread(picture))[..., :3]
 
 
@@ -323,7 +340,7 @@ def draw_sheet(
     limits: Limits = MappingProxyType({}),
     face: Face | None = None,
     openings: Sequence[tuple[str, Opening]] = (),
-    coverage: np.ndarray | None = None,
+    coverage: np.ndarray | str | None = None,
     clearance_mm: float = 0.0,
 ) -> list[Figure]:
     """Return a process sheet as figures of its pages.
@@ -338,7 +355,7 @@ def draw_sheet(
         limits: what the keys of [chamber] may be, for the drawing's dimensions.
         face: on which the chamber stands, if it is known.
         openings: those that are cut along the part's section, each with its words.
-        coverage: picture of the coverage, red, green and blue of each pixel.
+        coverage: picture of the coverage, red, green and blue of each pixel, or why there is none.
         clearance_mm: round the part in its openings.
     """
     ignore_settings_here()
@@ -347,22 +364,23 @@ def draw_sheet(
     pages = [axes]
     red = [one for one in first.content if isinstance(one, Sentence) and one.kind == "warning"]
     content = [one for one in first.content if one not in red]
+    if isinstance(coverage, str):
+        content.append(Sentence(NO_COVERAGE.format(coverage)))
     whole = [*content, *further.content]
     top = _heading(axes, first.title, sheet, red)
     settings = [one for one in content if isinstance(one, Table) and not one.head]
     texts = (whole, settings, top - FOOT)
-    shown, _, _, room = _laid_out(*texts, [DRAWING_PER_PT * size for size in SIZES])
-    if shown is settings:  # with somewhat smaller letters the drawing may have a larger scale
-        room = max(room, top - FOOT + _content(Writer(None, LEAST_ALONE), settings, 0.0))
+    shown, _, room = _laid_out(*texts, [DRAWING_PER_PT * size for size in SIZES])
+    if shown is not whole:  # with somewhat smaller letters the drawing may have a larger scale
+        room = max(room, top - FOOT + _content(Writer(None, LEAST_ALONE), shown, 0.0))
     # A drawing of that scale is lower than its room: with less room the letters may be larger.
     tall = drawing_height(chamber, (INNER, min(MOST_DRAWING, room) - CAPTION))
-    shown, size, most, _ = _laid_out(*texts, [CAPTION + tall] * len(SIZES))
-    alone = shown is whole
+    shown, size, _ = _laid_out(*texts, [CAPTION + tall] * len(SIZES))
     _drawing(axes, chamber, top, tall, limits, face)
-    _content(Writer(axes, size, most), shown, top - tall - CAPTION)
-    if not alone:
-        measured = [one for one in content if one not in settings]
-        pages += _further_pages(further, measured, sheet.name)
+    _content(Writer(axes, size), shown, top - tall - CAPTION)
+    if shown is not whole:
+        left = [one for one in content if one not in shown]
+        pages += _further_pages(further, left, sheet.name)
     if drawing_scale(chamber, (INNER, tall)) < LEAST_SCALE:
         larger, y = _further_page("Drawing", sheet.name)
         tall = drawing_height(chamber, (INNER, y - FOOT - CAPTION))
@@ -370,7 +388,7 @@ def draw_sheet(
         pages.append(larger)
     pages += _further_steps(chamber, sheet.name, limits, face)
     y = 0.0
-    if coverage is not None:
+    if isinstance(coverage, np.ndarray):
         last, y = _coverage_page(coverage, sheet.name)
         pages.append(last)
     if openings:
@@ -390,27 +408,29 @@ def draw_sheet(
 
 
 def _laid_out(
-    whole: Sequence[Block], content: Sequence[Block], room: float, needed: Sequence[float]
-) -> tuple[Sequence[Block], float, int, float]:
+    whole: Sequence[Block], settings: Sequence[Block], room: float, needed: Sequence[float]
+) -> tuple[Sequence[Block], float, float]:
     """Return what the first page shows, the size of its letters, and what they leave room for.
 
-    The first page has all, or where its letters would be too small, the first part of it.
+    The first page has all, or where its letters would be too small, the first part of it. If that
+    does not fit with the smallest letters, its last tables are left to further pages.
 
     Args:
-        whole, content: all that is to be shown, and its first part.
+        whole, settings: all that is to be shown, and the tables that are its first part.
         room: height for the text and the drawing above it [mm].
         needed: height of the drawing with its caption for each of SIZES [mm].
     Returns:
-        What is shown, the size [pt], the most lines of a text, and the height that is left [mm].
+        What is shown, the size [pt], and the height that is left [mm].
     """
-    for shown, most, least in ((whole, ALL_LINES, LEAST_ALONE), (content, MOST_LINES, 0.0)):
+    parts = [settings[:count] for count in range(len(settings), 0, -1)]
+    for shown, least in ((whole, LEAST_ALONE), *((one, 0.0) for one in parts)):
         for size, height in zip(SIZES, needed, strict=True):
-            left = room + _content(Writer(None, size, most), shown, 0.0)
+            left = room + _content(Writer(None, size), shown, 0.0)
             if left >= height or size <= least:
                 break
         if left >= height:
             break
-    return shown, size, most, left
+    return shown, size, left
 
 
 def _page() -> Axes:
@@ -433,7 +453,9 @@ def _heading(axes: Axes, title: str, sheet: Document, red: Sequence[Sentence]) -
     """
     y = Writer(axes, 15.0).write(title, MARGIN, HEIGHT - MARGIN, 60.0, bold=True)
     beside, width = MARGIN + 62.0, INNER - 62.0
-    name = Writer(axes, 9.0).write(sheet.name, beside, HEIGHT - MARGIN, width, bold=True)
+    name = Writer(axes, 9.0, MOST_LINES).write(
+        sheet.name, beside, HEIGHT - MARGIN, width, bold=True
+    )
     y = min(y, Writer(axes, 7.0).write(sheet.subtitle, beside, name, width, colour=DARK_GREY)) - 1.5
     y = Writer(axes, 8.0).write(sheet.answer, MARGIN, y, INNER) - 1.5
     for one in red:
@@ -442,32 +464,56 @@ def _heading(axes: Axes, title: str, sheet: Document, red: Sequence[Sentence]) -
     return y
 
 
-def _further_pages(section: Section, measured: Sequence[Block], name: str) -> Iterator[Axes]:
+def _further_pages(section: Section, left: Sequence[Block], name: str) -> Iterator[Axes]:
     """Yield pages with the tables of a section, one below the other, as wide as the page.
 
     A page is not finished before the next one is asked for.
 
     Args:
-        measured: what stands above them on the first of these pages.
+        left: what the first page has no room for. It stands above them.
     """
-    axes, y = _further_page(section.title, name)
+    axes, top = _further_page(section.title, name)
     yield axes
-    measure, write = Writer(None, SIZES[0], ALL_LINES), Writer(axes, SIZES[0], ALL_LINES)
-    if measured:
-        y = _content(Writer(axes, SIZES[0]), measured, y) - 0.8 * write.line
-    for table in section.content:
-        assert isinstance(table, Table)
-        names, caption = measure.names(table, INNER), table.caption
-        for row in table.rows:
-            head = -measure.caption(caption, MARGIN, 0.0, INNER) if caption else 0.0
-            if y - head + measure.row(row, MARGIN, 0.0, INNER, names) <= FOOT:
+    measure, write, y = Writer(None, SIZES[0]), Writer(axes, SIZES[0]), top
+    measured = [one for one in left if not isinstance(one, Table) or one.head]
+    for block in (*measured, *(one for one in left if one not in measured), *section.content):
+        head, rows = _in_rows(block, measure)
+        is_begun = False
+        for row in rows:
+            tall = -row(measure, 0.0) - (0.0 if is_begun else head(measure, 0.0))
+            if y - tall <= FOOT and y < top:
                 axes, y = _further_page(section.title, name)
                 yield axes
-                write, caption = Writer(axes, SIZES[0], ALL_LINES), table.caption
-            if caption:
-                y, caption = write.caption(caption, MARGIN, y, INNER), ""
-            y = write.row(row, MARGIN, y, INNER, names) - 0.3 * write.line
+                write, is_begun = Writer(axes, SIZES[0]), False
+            y = y if is_begun else head(write, y)
+            y, is_begun = row(write, y) - 0.3 * write.line, True
         y -= 0.8 * write.line
+
+
+def _in_rows(block: Block, measure: Writer) -> tuple[Written, list[Written]]:
+    """Return what writes the head of a block as wide as the page, and each row of it.
+
+    Args:
+        measure: of the size of the letters, by which columns are as wide as their names.
+    """
+
+    def of_columns(row: Sequence[str], bold: bool = False) -> Written:
+        return lambda write, y: write.table_row(row, y, bold)
+
+    def of_names(row: Sequence[str], names: float) -> Written:
+        return lambda write, y: write.row(row, MARGIN, y, INNER, names)
+
+    def nothing(_: Writer, y: float) -> float:
+        return y
+
+    if isinstance(block, Sentence):
+        return nothing, [of_names(("", block.text), 0.0)]
+    assert isinstance(block, Table)
+    if block.head:
+        return of_columns(block.head, bold=True), [*map(of_columns, block.rows)]
+    names, caption = measure.names(block, INNER), block.caption
+    rows = [of_names(row, names) for row in block.rows]
+    return (lambda write, y: write.caption(caption, MARGIN, y, INNER)), rows
 
 
 def _drawing(
@@ -524,7 +570,9 @@ def _further_page(title: str, name: str) -> tuple[Axes, float]:
     axes = _page()
     y = Writer(axes, 12.0).write(title, MARGIN, HEIGHT - MARGIN, 96.0, bold=True)
     beside, width = MARGIN + 98.0, INNER - 98.0
-    return axes, min(y, Writer(axes, 9.0).write(name, beside, HEIGHT - MARGIN, width)) - 3.0
+    return axes, min(
+        y, Writer(axes, 9.0, MOST_LINES).write(name, beside, HEIGHT - MARGIN, width)
+    ) - 3.0
 
 
 def _content(write: Writer, content: Sequence[Block], top: float) -> float:

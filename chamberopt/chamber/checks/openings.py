@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.checks.place_names import SIDE_WALL, surface_names
+from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, surface_names
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL
 from chamberopt.geometry.outline import frame_along
 from chamberopt.geometry.solids import passes_opening
@@ -68,6 +68,12 @@ class Opening(NamedTuple):
     outline: np.ndarray | None = None
     # Of the box round the part in the first PLATE outside, if that is wider than the opening [m].
     wider: tuple[float, float] | None = None
+
+
+def part_is_ceiling(chamber: Chamber) -> bool:
+    """Return whether the part closes the room at its highest place, which has no other ceiling."""
+    highest = chamber.vertices[chamber.triangles[chamber.tags == TAG_PART], 2].max()
+    return bool(highest > chamber.height - THIN) and CEILING not in surface_names(chamber)
 
 
 def mounting(part: Part, opening: Opening, clear: float) -> Mounting:

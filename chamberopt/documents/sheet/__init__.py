@@ -11,7 +11,7 @@ from chamberopt.documents.sheet.document import (
 from chamberopt.documents.sheet.expected import calibrated_to, first_checks
 from chamberopt.documents.sheet.openings import clearance_of, drawn_openings, outlines_in_words
 from chamberopt.documents.sheet.rows import AsBuilt, amplitude_text, key_row
-from chamberopt.documents.sheet.settings import chamber_limits, slit_limits
+from chamberopt.documents.sheet.settings import chamber_limits, reference_limits, slit_limits
 from chamberopt.documents.sheet.warned import alarms, cautions
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "limit_tables",
     "outlines_in_words",
     "process_sheet",
+    "reference_limits",
     "setting_tables",
     "slit_limits",
     "title_block",

@@ -29,6 +29,7 @@ from chamberopt.documents.sheet.warned import (
 from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
+    from chamberopt.chamber.checks.openings import Opening
     from chamberopt.results.load import Result
 
 DIGEST = 12  # characters of a digest in the title block
@@ -78,7 +79,7 @@ def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Documen
         (),
         [
             Section("Process sheet", content),
-            Section("Measurements, limits and warnings", limit_tables(result)),
+            Section("Measurements, limits and warnings", limit_tables(result, built.openings)),
             Section("Title block", [block]),
         ],
     )
@@ -114,16 +115,20 @@ def setting_tables(result: Result, built: AsBuilt) -> list[Table]:
         ("Sonotrode", sonotrode_rows(result, built.face_mm)),
         ("Shot", shot_rows(result)),
         ("Steps", step_rows(result, built)),
-        ("To peen a part", run_rows(result, built.openings)),
+        ("To peen a part", run_rows(result, built)),
         ("Peening, and what to expect", expected_rows(result, built.usual)),
     ])  # fmt: skip
 
 
-def limit_tables(result: Result) -> list[Table]:
-    """Return tables on limits, tolerances, and everything that the process is warned of."""
+def limit_tables(result: Result, openings: Sequence[Opening] = ()) -> list[Table]:
+    """Return tables on limits, tolerances, and everything that the process is warned of.
+
+    Args:
+        openings: through which the part goes out.
+    """
     return _tables([
         ("Zones and limits", zone_rows(result)),
-        ("Tolerances", tolerance_rows(result)),
+        ("Tolerances", tolerance_rows(result, openings)),
         ("Not in these figures", (("", text) for text in cautions(result))),
         ("Warnings", warning_rows(result)),
     ])  # fmt: skip

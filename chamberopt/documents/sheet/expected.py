@@ -18,6 +18,7 @@ from chamberopt.documents.ranges import time_at_slow_end
 from chamberopt.documents.report import limits_of_intervals
 from chamberopt.documents.sheet.rows import (
     Row,
+    for_the_shop,
     is_unresolved,
     peak_to_valley,
     range_text,
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
 TIME, UNIFORM = "time_to_98_s", "uniform_coverage"
 UNIFORM_IS = (
     "Uniform coverage is the mean less the standard deviation over the target: 1 if all is covered."
+)
+NO_INTENSITY = (
+    "Almen intensity in mmA is not known before strips are peened here: see Measure first."
 )
 EXPECTED = (
     "mean_coverage",
@@ -80,13 +84,13 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
         yield "Almen intensity, roughly", near
     if wanted is None and usual is not None:
         yield "Almen intensity, usual", f"{range_text(usual)}, {usual.text}"
-    if wanted is None and (reason := why_no_intensity(calibration)):
-        yield "", f"{reason[0].upper()}{reason[1:]}."
+    if wanted is None and why_no_intensity(calibration):
+        yield "", NO_INTENSITY
     for one in answer_lines(result, load_start(result)):
         if one.about in ("best", "calibration", "ranges"):  # zones have their own block
-            first, over, rest = one.text.partition(" Over their ranges")
+            first, over, rest = for_the_shop(one.text).partition(" Over their ranges")
             yield "", first
-            if rest:  # a row of its own: a long one is cut
+            if rest:
                 yield "", f"{over.strip()}{rest}"
     if UNIFORM in [row.name for row in shown]:
         yield "", UNIFORM_IS
@@ -146,7 +150,7 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
             kind = "N" if rough.is_for_n else "A"
             known = rough.on_n_strips if rough.is_for_n else f"{plain(rough.value, 2)} mmA"
             known += f"{rough.factor_in_words}, as impacts on the target would give"
-        strips = f"{kind} strips {_strip_times(result)}, for chamberopt calibrate"
+        strips = f"{kind} strips {_strip_times(result)}, to calibrate by"
         if level_mm is not None and not why_no_strip(design, StripSize()):
             strips += (
                 f"; in the lid in place of the part, {level_mm} mm from the sonotrode, facing it"

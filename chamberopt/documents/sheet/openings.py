@@ -24,6 +24,8 @@ CLAMPED, SHORT = 3e-3, 15e-3
 CLAMP = "clamp it there"
 GUIDED = "guide it there in a bushing, stopped along its axis"  # of a part that turns
 THROUGH = "; it goes on through the wall, fixed there, or in bearings and sealed"
+FOLLOWS = "follows from the distance, as the walls end on the part"
+FILLED = "balls go in and out there"
 MOUNTED: dict[Mounting, str] = {
     "part goes in": "the part goes in from outside",
     "wall goes over": "the wall goes over it from outside",
@@ -109,6 +111,30 @@ def clearance_of(result: Result) -> float:
     return 0.0 if holder is None else holder.clearance
 
 
+def ends_walls(openings: Sequence[Opening]) -> bool:
+    """Return whether side walls end on the part, which lies on them and so sets their height."""
+    return any(one.wall != CEILING and _is_end(one) for one in openings)
+
+
+def _is_end(one: Opening) -> bool:
+    """Return whether a wall ends on the part there, so that nothing is cut."""
+    return one.form == "edge" or min(one.size) < EDGE
+
+
+def lid_in_words(built: AsBuilt) -> str:
+    """Return in words how the chamber opens: by its lid, the part, or where its walls are split."""
+    openings, mountings = built.openings, built.mountings
+    if "split" in mountings:
+        return f"the split of its walls; {FILLED}"
+    if built.is_ceiling or ends_walls(openings):
+        return f"the part, which lifts off; {FILLED}"
+    if not any(one.wall == CEILING for one in openings):
+        return f"the ceiling, which lifts off; {FILLED}"
+    if "wall goes over" in mountings:
+        return f"the ceiling, which lifts off over the part; {FILLED}"
+    return f"the part, or the ceiling with it, which lifts off; {FILLED}"
+
+
 def opening_in_words(one: Opening, clear: float = 0.0) -> str:
     """Return in words how large an opening is cut, and in which wall.
 
@@ -116,7 +142,7 @@ def opening_in_words(one: Opening, clear: float = 0.0) -> str:
         clear: clearance round the part [m]. Along the part's section it is told beside the outline.
     """
     wall, wider = _wall_of(one), 0.0 if one.form == "other" else 2.0 * clear
-    if one.form == "edge" or min(one.size) < EDGE:
+    if _is_end(one):
         return f"{_side(max(one.size))} mm of {wall}, which ends on the part,"
     if one.form == "round":
         return f"round, Ø {_side(0.5 * sum(one.size) + wider)} mm, in {wall}, its middle"

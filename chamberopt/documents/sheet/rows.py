@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 Row = tuple[str, str]  # a name and its value, or "" and a sentence
 
+OF_COMMANDS = r" \((?:[^()]*--[^()]*|no source read|chamberopt [a-z]+|docs/[^()]*)\)"
 MOST_ROWS = 4  # sizes of shot, or further sonotrodes; the report has all of them
 
 
@@ -36,6 +38,12 @@ class AsBuilt(NamedTuple):
     later: Sequence[Sequence[Opening]] = ()  # openings in each further step
     level_mm: int | None = None  # of the target above the sonotrode, where strips are set
     radii: Sequence[float] = ()  # of the fillets that are the target [m]
+    is_ceiling: bool = False  # the part closes the room, which has no other ceiling
+
+
+def for_the_shop(text: str) -> str:
+    """Return a text without what is for who designs: commands, options, and sources of rules."""
+    return re.sub(OF_COMMANDS, "", text)
 
 
 def first_rows(rows: Sequence[Row], what: str, most: int = MOST_ROWS) -> Iterator[Row]:

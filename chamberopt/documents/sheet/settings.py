@@ -17,8 +17,11 @@ from chamberopt.design.materials import alloys, find
 from chamberopt.design.tolerances import tolerance_box
 from chamberopt.documents.answer import answer_lines
 from chamberopt.documents.sheet.openings import (
+    FOLLOWS,
     clearance_of,
+    ends_walls,
     fixture_rows,
+    lid_in_words,
     opening_in_words,
     place_of,
 )
@@ -77,6 +80,20 @@ def slit_limits(result: Result) -> dict[str, tuple[float, float, float]]:
         for key, side in sides.items()
         if side is not None and abs(getattr(chamber, key, math.inf) - side) < SAME_MM
     }
+
+
+def reference_limits(
+    result: Result, openings: Sequence[Opening]
+) -> dict[str, tuple[float, float, float]]:
+    """Return the key of [chamber] that follows from others, as the part lies on the walls.
+
+    Then the height of the walls and the distance from the sonotrode to the part differ by a length
+    of the part, and only one of them can have a tolerance.
+    """
+    height = getattr(result.design.chamber, "height_mm", None)
+    if height is None or not ends_walls(openings):
+        return {}
+    return {"height_mm": (height, height, height)}
 
 
 def _over_face(result: Result) -> str:
@@ -152,16 +169,21 @@ def _metal(result: Result) -> str:
 def chamber_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     table = result.design.chamber.model_dump(mode="json", exclude_none=True)
     wall = result.design.materials.wall.alloy
-    yield "shape", PurePath(table.pop("shape")).name + (f", walls of {wall}" if wall else "")
+    walls = f", walls of {wall}" if wall else ""
+    yield "shape", f"{PurePath(table.pop('shape')).name}{walls}; inside sizes"
     for key in ("sonotrode_distance_mm", "facets", "mesh", "unit"):
         table.pop(key, None)
     counted = {key: table.pop(key, ()) for key in ("holes", "deflectors")}
-    rows = []
+    rows, follows = [], reference_limits(result, built.openings)
     for key, value in table.items():
         if value not in (0, 0.0, []):
             name, text = key_row(key, value)
-            rows.append((name, with_limits(result, f"chamber.{key}", text)))
+            if key in follows:
+                rows.append((name, f"({text}): {FOLLOWS}"))
+            else:
+                rows.append((name, with_limits(result, f"chamber.{key}", text)))
     yield from first_rows(rows, "numbers", MOST_KEYS)
+    yield "opened at", lid_in_words(built)
     for what, several in counted.items():
         if several:
             yield what, f"{len(several)}: see the report"
@@ -249,12 +271,11 @@ def step_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
             yield from first_rows([(f"opening, step {number}", one) for one in found], "openings")
 
 
-def run_rows(result: Result, openings: Sequence[Opening] = ()) -> Iterator[Row]:
+def run_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     """Yield what an operator does for each part, in its order.
 
-    Args:
-        openings: through which the part goes out. One that goes out through the ceiling closes the
-            chamber, so that the balls are there before it.
+    A part that is the ceiling or goes out through it closes the chamber, so that the balls are
+    there before it.
     """
     design = result.design
     mount = "the part as above; measure from it to the face at rest"
@@ -262,12 +283,12 @@ def run_rows(result: Result, openings: Sequence[Opening] = ()) -> Iterator[Row]:
         mount = "the part and its drive; turn it once by hand: it touches no wall"
     steps = [*design.in_steps.values()]
     fill = f"{plain(weighed_g(steps[0].shot), 3)} g of balls, weighed"
-    if any(one.wall == CEILING for one in openings):
+    if built.is_ceiling or any(one.wall == CEILING for one in built.openings):
         yield "1 fill", fill
         yield "2 mount", f"{mount}; it closes the chamber"
     else:
         yield "1 mount", mount
-        yield "2 fill", f"{fill}; close the chamber"
+        yield "2 fill", f"{fill}; put the lid on"
     each = ", then ".join(
         f"{plain(one.process.treatment_time)} s as step {k}" for k, one in enumerate(steps, 1)
     )

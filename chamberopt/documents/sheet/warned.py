@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from chamberopt.common.key_words import key_in_words, title_with_unit
@@ -13,23 +12,25 @@ from chamberopt.design.tolerances import USUAL, USUAL_IN_WORDS, tolerance_box
 from chamberopt.documents.answer import answer_lines, shot_lines
 from chamberopt.documents.report import open_matters, open_warnings
 from chamberopt.documents.sheet.expected import expected_figures
+from chamberopt.documents.sheet.openings import FOLLOWS
 from chamberopt.documents.sheet.rows import (
     Row,
     face_in_words,
+    for_the_shop,
     is_unresolved,
     peak_to_valley,
     range_text,
 )
+from chamberopt.documents.sheet.settings import reference_limits
 from chamberopt.documents.tolerances import sheet_rows
 from chamberopt.documents.wanted import intensity_lines, time_lines
 from chamberopt.documents.wording import keys_in_words, plain
 
 if TYPE_CHECKING:
+    from chamberopt.chamber.checks.openings import Opening
     from chamberopt.results.load import Result
 
 WIDEST_FACE = 90.0  # mm: larger faces need slots or are several (chamber/usual_shop.toml)
-# What is for who designs: options of commands, and how well a rule is founded.
-OF_COMMANDS = r" \((?:[^()]*--[^()]*|no source read)\)"
 # Factor beside the usual range up to which an intensity without strips counts as in it: those of
 # pilots and of results differ by as much.
 ROUGHLY = 1.33
@@ -85,7 +86,7 @@ def unusual_intensity(result: Result, usual: WantedIntensity | None) -> Iterator
         yield (
             f"The expected Almen intensity, {plain(found.value, 2)} mmA, is "
             f"{'below' if off < 0.0 else 'above'} {range_text(usual)}, {usual.text}: agree on it, "
-            "or ask for another one (process.intensity_mmA)."
+            "or ask for another one."
         )
 
 
@@ -123,14 +124,20 @@ def zone_rows(result: Result) -> Iterator[Row]:
     yield from (("", one.text) for one in lines)
 
 
-def tolerance_rows(result: Result) -> Iterator[Row]:
+def tolerance_rows(result: Result, openings: Sequence[Opening] = ()) -> Iterator[Row]:
     """Yield rows with the tolerance range of each number of the design that has a tolerance.
+
+    One that follows from another, as the part lies on the walls, has none of its own.
 
     If the tolerances were simulated, further rows give their effect on coverage etc.
     """
     box = tolerance_box(result.design)
+    follows = [f"chamber.{key}" for key in reference_limits(result, openings)]
     for name, (low, high) in box.items():
         designed = plain(result.design.value(name))
+        if name in follows:
+            yield title_with_unit(name), f"({designed}): {FOLLOWS}"
+            continue
         yield title_with_unit(name), f"{plain(low)} to {plain(high)}, as designed {designed}"
     found = result.record.tolerances
     if result.design.tolerances is None:
@@ -150,4 +157,4 @@ def warning_rows(result: Result) -> Iterator[Row]:
     elif not (left := open_warnings(result)):
         yield "", "There are none."
     else:
-        yield from (("", re.sub(OF_COMMANDS, "", keys_in_words(text))) for text in left)
+        yield from (("", for_the_shop(keys_in_words(text))) for text in left)

@@ -95,14 +95,15 @@ def _in_one_piece(
 
     lines, _ = cut(chamber.part.vertices, chamber.part.triangles, 1 - plane.right, 1e-3 * plane.at)
     (low, bottom), (high, top) = (ends[[plane.right, 2]] for ends in ends_of(chamber))
-    window = shapely.box(low - left, bottom, high + right, top + above)
-    pieces = shapely.get_parts(inside(1e3 * lines).intersection(window))
+    section = inside(1e3 * lines)
+    (least, _, most, _) = section.bounds if not section.is_empty else (low, bottom, high, top)
+    drawn = shapely.box(least, bottom, most, top + above)
+    pieces = shapely.get_parts(section.intersection(drawn))
     is_alone = ~shapely.intersects(pieces, shapely.box(low, bottom, high, top))
     joined, found = shapely.union_all(pieces[~is_alone]), []
-    for wall, way, out in ((low, -1.0, left), (high, 1.0, right)):
-        x1, x2 = sorted((wall, wall + way * out))
-        beside = shapely.box(x1, bottom, x2, top + above)
-        if shapely.intersects(pieces[is_alone], beside).any():
+    for wall, way, out, end in ((low, -1.0, left, least), (high, 1.0, right, most)):
+        beside = shapely.box(min(wall, end), bottom, max(wall, end), top + above)
+        if out > 0.0 and shapely.intersects(pieces[is_alone], beside).any():
             tried = np.linspace(0.0, out, TRIED)
             upright = [[(x, bottom), (x, top + above)] for x in wall + way * tried]
             thick = shapely.length(shapely.intersection(shapely.linestrings(upright), joined))

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 # All lengths are in mm on the page.
 
 Point = tuple[float, float]
-Limits = Mapping[str, tuple[float, float, float]]  # value, least and largest value [mm] by key
+# Value, least and largest value [mm] by key. All three are equal of what follows from other sizes.
+Limits = Mapping[str, tuple[float, float, float]]
 SIZE, WIDTH = 7.0, 0.4  # pt, of the text and of the lines
 SHORT = 9.0  # mm: a shorter dimension has its arrows outside
 STUB = 3.5  # mm, of arrows outside
@@ -80,6 +81,11 @@ def across_line(axes: Axes, start: Point, end: Point, name: str = "") -> None:
             axes.text(x, y, name, size=8.0, ha="center", va="center", weight="bold")
 
 
+def reference(text: str) -> str:
+    """Return the text of a dimension that follows from others: in parentheses (ISO 129-1)."""
+    return f"({text})"
+
+
 def with_limits(text: str, length: float, limits: Limits, *keys: str) -> str:
     """Return the text of a dimension with the tolerance of the key that it shows, if any.
 
@@ -90,6 +96,8 @@ def with_limits(text: str, length: float, limits: Limits, *keys: str) -> str:
     for key in keys:
         value, low, high = limits.get(key, (math.inf, 0.0, 0.0))
         if abs(value - length) < SAME:
+            if low == high:
+                return reference(text)
             down, up = value - low, high - value
             if abs(up - down) < 1e-9 * value:
                 return f"{text} ±{plain(up)}"

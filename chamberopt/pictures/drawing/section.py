@@ -14,12 +14,13 @@ from chamberopt.design.shape_surface import TAG_SONOTRODE, TAG_WALL
 from chamberopt.pictures.charts.colours import BLACK, BLUE, DARK_GREY, FIXTURE_COLOURS, SONOTRODE
 from chamberopt.pictures.drawing.arrangement import FACE, WALL
 from chamberopt.pictures.drawing.centres import centres, distinct
-from chamberopt.pictures.drawing.cuts import SectionPlane, cut, face_size_mm, inside
+from chamberopt.pictures.drawing.cuts import SAME, SectionPlane, cut, face_size_mm, inside
 from chamberopt.pictures.drawing.dimensions import (
     SHORT,
     Limits,
     across_line,
     dimension,
+    reference,
     with_limits,
 )
 from chamberopt.pictures.drawing.view import LABEL, PART, View, draw_lines, fill, label
@@ -106,6 +107,8 @@ def draw_section(
     lowest, high = 1e3 * chamber.lowest_of_part, float(view.high[1])
     text = with_limits(plain(lowest), lowest, limits, "sonotrode_distance_mm")
     total = with_limits(plain(high), high, limits, "height_mm")
+    if abs(high - lowest) < SAME:  # the part is the ceiling
+        total = reference(plain(high))
     heights = _draw_centres(axes, chamber, view, planes, [lowest, high])
     for way, wall, out, rows in (
         (-1, view.low, sides[0], [(lowest, text), *heights[-1]]),

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import matters
-from chamberopt.chamber.checks.openings import Opening
+from chamberopt.chamber.checks.openings import Opening, part_is_ceiling
 from chamberopt.chamber.checks.strips import StripOfTarget
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
@@ -35,6 +35,7 @@ from chamberopt.documents.sheet import (
     first_checks,
     limit_tables,
     process_sheet,
+    reference_limits,
     setting_tables,
     slit_limits,
     title_block,
@@ -42,6 +43,7 @@ from chamberopt.documents.sheet import (
 from chamberopt.documents.wording import metric_label, plain
 from chamberopt.peening.tolerance_result import ToleranceResult, ToleratedFigure
 from chamberopt.pictures.drawing.chamber import draw_chamber
+from chamberopt.pictures.drawing.dimensions import with_limits
 from chamberopt.pictures.drawing.section import JAWS
 from chamberopt.pictures.subprocess_drawing import missing_opengl
 from chamberopt.printers.sheet_page import (
@@ -87,7 +89,7 @@ def test_its_figures_are_those_of_the_report(folder: Path) -> None:
         if one.name in ("mean_coverage", "time_to_98_s", "strength_um"):
             assert expected[one.label.text] == one.label.format(one.result)
     assert expected["peening time"] == "5 s"
-    assert "Almen intensity in mmA takes a calibration" in expected[""]
+    assert "Almen intensity in mmA is not known before strips are peened here" in expected[""]
     assert rows["Part and pose"]["sonotrode to lowest point"] == "15 mm"
     assert rows["Sonotrode"]["amplitude"] == "25 µm zero-to-peak = 50 µm peak to valley"
     assert rows["Sonotrode"]["face in the chamber"] == "Ø 50 mm, Ti-6Al-4V"
@@ -230,8 +232,8 @@ def test_jaws_are_drawn_where_the_part_stands_far_enough_out(
 def test_strips_are_peened_after_parts_and_twice_of_their_saturation(folder: Path) -> None:
     result = load_result(folder)
     for time, told in (
-        (Estimate(38.0, 12.0), "A strips after 9.5, 19, 38 and 76 s, for"),
-        (Estimate(38.0, math.inf, in_words=NOT_RESOLVED), "A strips at 4 or 5 times, for"),
+        (Estimate(38.0, 12.0), "A strips after 9.5, 19, 38 and 76 s, to"),
+        (Estimate(38.0, math.inf, in_words=NOT_RESOLVED), "A strips at 4 or 5 times, to"),
     ):
         metrics = {**result.record.metrics, "saturation_time_s": time}
         record = result.record.model_copy(update={"metrics": metrics})
@@ -432,7 +434,52 @@ def test_nothing_overlaps_or_is_cut_off(folder: Path, much: bool) -> None:
         require_apart(page)
         assert {f"{number} of {len(pages)}", "drawing no.", "revision"} < {text for text, _ in page}
     texts = [text for page in pages for text, _ in page]
+    told = [text for text in texts if not text.startswith("name name")]  # but in headings
+    assert not any(text.endswith("…") for text in told)
     assert all(any(text.startswith(f"{k}: ") for text in texts) for k in range(len(limits[0].rows)))
+
+
+def test_a_sheet_without_a_page_of_coverage_says_why(folder: Path) -> None:
+    sheet = process_sheet(load_result(folder), AsBuilt((50.0,)))
+    for coverage, page in (("no OpenGL library", 0), (np.zeros((40, 60, 3)), 1)):
+        pages = draw_sheet(sheet, build_chamber(plate_design()), coverage=coverage)
+        texts = [text for one in pages for text, _ in boxes_of(one)]
+        told = "No page shows the coverage by place: no OpenGL library." in texts
+        assert (told, "Coverage by place" in texts) == (not page, bool(page))
+
+
+def test_a_part_that_lies_on_the_walls_leaves_one_tolerance(folder: Path) -> None:
+    """A wall ends on it: height and distance differ by a length of the part."""
+    result = load_result(folder)
+    box = {"chamber.sonotrode_distance_mm": 0.2, "chamber.height_mm": 0.3}
+    design = result.design.changed({"tolerances": box})
+    result = replace(result, design=design)
+    top = Opening("the ceiling", (0.03, 0.04), (0.0, 0.0, 0.02), 0.01, (0.0, 0.0, 1.0))
+    edge = Opening("the wall", (0.04, 0.0), (0.02, 0.0, 0.02), 0.02, (1.0, 0.0, 0.0), "edge")
+    for openings, lid in (
+        ((), "the ceiling, which lifts off; balls go in and out there"),
+        ((top, edge), "the part, which lifts off; balls go in and out there"),
+        ((top,), "the part, or the ceiling with it, which lifts off; balls go in and out there"),
+    ):
+        built = AsBuilt((50.0,), openings)
+        tables = [*setting_tables(result, built), *limit_tables(result, openings)]
+        rows = {one.caption: dict(one.rows) for one in tables}
+        follows = edge in openings
+        assert rows["Chamber"]["opened at"] == lid
+        assert rows["Chamber"]["height"].startswith(
+            "(20 mm): follows" if follows else "20 mm (19.7"
+        )
+        told = rows["Tolerances"]["Chamber height [mm]"]
+        assert told.startswith("(20): follows" if follows else "19.7 to 20.3")
+        limits = chamber_limits(result) | reference_limits(result, openings)
+        assert with_limits("20", 20.0, limits, "height_mm") == ("(20)" if follows else "20 ±0.3")
+    ceiling = {
+        one.caption: dict(one.rows)
+        for one in setting_tables(result, AsBuilt((50.0,), is_ceiling=True))
+    }
+    assert ceiling["Chamber"]["opened at"].startswith("the part, which lifts off")
+    assert "it closes the chamber" in ceiling["To peen a part"]["2 mount"]
+    assert part_is_ceiling(build_chamber(plate_design()))
 
 
 def test_what_forbids_to_use_it_is_in_red(folder: Path) -> None:
@@ -486,7 +533,7 @@ def test_dimensions_have_the_tolerances_of_the_design(folder: Path) -> None:
     draw_chamber(axes, build_chamber(result.design), 0.0, 100.0, (180.0, 100.0), limits)
     texts = [one.get_text() for one in axes.texts]
     assert "15 ±0.5" in texts
-    assert "15" in texts  # the plate is the ceiling: this is not height_mm
+    assert "(15)" in texts  # the plate is the ceiling: this is not height_mm
     assert "Ø 50 +0.3/−0.1" in texts
     rows = rows_of(result)["Chamber"]
     assert rows["diameter"] == "50 mm (49.9 to 50.3)"
@@ -515,8 +562,8 @@ def test_it_is_an_a4_page_with_a_map_and_replaces_only_an_older_one(
     boxes = re.findall(rb"/MediaBox \[ ([\d. ]+) \]", content)
     for box in boxes:
         assert tuple(map(float, box.split())) == pytest.approx((0.0, 0.0, *A4), abs=0.02)
-    # Where the computer can draw in 3D, a second page has the coverage by place.
-    assert len(re.findall(rb"/Type /Page\b", content)) == len(boxes) == 1 + has_map
+    # Where the computer can draw in 3D, a third page has the coverage by place.
+    assert len(re.findall(rb"/Type /Page\b", content)) == len(boxes) == 2 + has_map
     assert b"/FontFile2" in content  # letters that can be selected, not their outlines
     precious = tmp_path / "precious.pdf"
     precious.write_bytes(b"%PDF-1.4 of somebody")
@@ -563,5 +610,6 @@ def test_lines_are_broken_to_their_width() -> None:
         text = "\n".join(broken(units, float(width), 8.0, most=20))
         assert all(one in text for one in whole)
         assert "7\u00a0" not in text
-    assert broken(100 * "word ", 20.0, 8.0)[-1].endswith("…")
+    assert broken(100 * "word ", 20.0, 8.0, most=4)[-1].endswith("…")
+    assert "…" not in "".join(broken(100 * "word ", 20.0, 8.0))
     assert broken("工 gear\x1b\n1", 30.0, 8.0) == ["? gear? 1"]  # the font has no such letters
