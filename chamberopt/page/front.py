@@ -28,7 +28,7 @@ from chamberopt.geometry.meshes.part_mesh import PartMesh, keep_part, read_part_
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import METRES_PER, STATED, UnknownUnitError
 from chamberopt.page.acts import Acts, free_folder, path_inside
-from chamberopt.page.answers import part_answer, shape_answer, surface_answer
+from chamberopt.page.answers import check_answers, part_answer, shape_answer, surface_answer
 from chamberopt.page.edited_file import alloy_suggestions
 from chamberopt.page.page_words import balls_named, choices, on_page
 from chamberopt.page.started_commands import JSON, OneCommand
@@ -84,17 +84,23 @@ class Front:
         proposal = _on_page(now["answer"] or now.pop("draft"))
         return now | {"proposal": proposal, "asked": self._asked}
 
-    def chamber(self, _: object) -> bytes:
+    def chamber(self, asked: Any) -> bytes:
         """Return the shape of the chamber that is proposed, of the draft until there is a design.
+
+        With `exact` it is the cavity that is left of it by part, holder and mask.
 
         Raises InputError if none is proposed yet.
         """
+        design = self._proposed()
+        return next(check_answers(design)) if asked.get("exact") else shape_answer(design)
+
+    def _proposed(self) -> Design:
         now: dict[str, Any] = self.command.status()
         if now.get("draft"):
-            return shape_answer(Design.model_validate(now["draft"]["design"]))
+            return Design.model_validate(now["draft"]["design"])
         if not now.get("answer"):
             raise InputError("no chamber is proposed yet")
-        return shape_answer(load_design(self._folder / str(now["result"]) / DESIGN))
+        return load_design(self._folder / str(now["result"]) / DESIGN)
 
     def stop(self, _: object) -> dict[str, object]:
         self.command.stop()

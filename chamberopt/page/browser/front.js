@@ -1,7 +1,7 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
 import { asLines, ask, attempt, element, onPage, unpack, warning } from "./state.js";
 import { followed, sinceBegin, stage } from "./steps.js";
-import { colourByState, lights } from "./surfaces.js";
+import { BODIES, colourByState, drawBodies, lights } from "./surfaces.js";
 
 const find = (id) => document.getElementById(id);
 const option = (one) => element("option", { value: [one].flat()[0], textContent: [one].flat().at(-1) }); // a text, or a pair with its words
@@ -41,7 +41,7 @@ async function open(design) {
 
 const view = new View3D(find("view")), tools = new Tools([view], find("tools"));
 let drawnPart = "", pointed = "", seen = null;
-const CHAMBER = ["walls", "sonotrode", "block", "edges"];
+const CHAMBER = ["walls", "sonotrode", "edges", "remeshed", ...BODIES];
 
 // Draw the part beside its size, where the names of its surfaces are pointed at.
 async function draw(part) {
@@ -81,15 +81,25 @@ async function drawChamber(isDraft) {
   view.highlight("part", null); // the target has its own colour
   view.pose("part", answer.rotation, answer.shift);
   colourByState(view, "part", seen, answer.state);
-  if (answer.block_points) view.surface("block", { points: answer.block_points, triangles: answer.block_triangles, kind: "sonotrode" });
-  else view.remove("block"); // of the proposal before
-  view.surface("walls", { points: answer.points, triangles: answer.walls, kind: "wall" });
-  view.surface("sonotrode", { points: answer.points.slice(), triangles: answer.sonotrode, kind: "sonotrode" });
-  view.lines("edges", answer.edges, seen.edges, "wall");
+  for (const name of CHAMBER) view.remove(name); // of the proposal before
+  view.show(["part"], true);
+  drawBodies(view, answer, seen.edges);
   const [low, high] = answer.shape_mm;
   const box = { low: low.map((x, i) => Math.min(x, answer.part_mm[0][i])), high: high.map((x, i) => Math.max(x, answer.part_mm[1][i])) };
   lookAt(box, answer.way);
   document.body.dataset.chamber = isDraft ? "draft" : "proposal";
+  await drawCavity(isDraft);
+}
+// What the shot flies in, without part, holder and mask, which takes longer to find; unless another proposal is shown by then.
+async function drawCavity(isDraft) {
+  const shown = view.get("walls"), cavity = await ask("/chamber", { exact: true }).then(unpack, () => null); // the proposal says what is wrong
+  if (!cavity || view.get("walls") !== shown) return;
+  drawBodies(view, cavity, seen.edges);
+  const own = cavity.part_points ? "remeshed" : "part";
+  if (own === "remeshed") view.surface(own, { points: cavity.part_points.slice(), triangles: cavity.part_triangles.slice(), open: !seen.closed });
+  view.show(["part"], own === "part");
+  colourByState(view, own, seen, cavity.state);
+  document.body.dataset.cavity = isDraft ? "draft" : "proposal";
 }
 view.renderer.domElement.addEventListener("dblclick", () => { if (view.home) view.look(view.home); });
 const shows = (named, name) => lights(named, view, () => ask("/face", { part: known.part, unit: known.unit, name }), () => pointed);

@@ -1,8 +1,7 @@
 // The view: part and chamber as the newest answers have them, and handles that turn and move the part.
 import { change, endMove, state, unpack, value } from "./state.js";
-import { colourByState } from "./surfaces.js";
+import { BODIES, colourByState, drawBodies } from "./surfaces.js";
 
-const BODIES = ["block", "deflectors", "holder", "mask"]; // that not every chamber has
 export const view = new View3D(document.getElementById("view"));
 const tools = new Tools([view], document.getElementById("tools"));
 let bodies = null, through = false;
@@ -52,16 +51,8 @@ function colour(name, state) {
 }
 
 function walls(answer) {
-  const surface = (name, kind, triangles, points = answer.points, opacity = undefined) => {
-    if (triangles?.length) view.surface(name, { points: points.slice(), triangles: triangles.slice(), kind, opacity });
-  };
-  surface("block", "sonotrode", answer.block_triangles, answer.block_points);
-  surface("walls", "wall", answer.walls);
-  surface("deflectors", "wall", answer.deflectors);
-  surface("sonotrode", "sonotrode", answer.sonotrode);
   bodies = answer;
-  for (const name of ["holder", "mask"]) surface(name, name, answer[`${name}_triangles`], answer[`${name}_points`], through ? 0.35 : 1);
-  view.lines("edges", answer.edges.slice(), part.edges, "wall");
+  drawBodies(view, answer, part.edges, through ? 0.35 : 1);
 }
 
 // Holder and mask are seen through while their faces are chosen.

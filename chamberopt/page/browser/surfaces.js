@@ -10,6 +10,21 @@ export function colourByState(view, name, { states, kinds }, state) {
   view.colourTriangles(name, colours);
 }
 
+export const BODIES = ["block", "deflectors", "holder", "mask"]; // that not every chamber has
+
+// Draw walls and sonotrode of a chamber, and of BODIES those that an answer has.
+export function drawBodies(view, answer, edges, opacity = 1) {
+  const surface = (name, kind, triangles, points = answer.points, own = undefined) => {
+    if (triangles?.length) view.surface(name, { points: points.slice(), triangles: triangles.slice(), kind, opacity: own });
+  };
+  surface("block", "sonotrode", answer.block_triangles, answer.block_points);
+  surface("walls", "wall", answer.walls);
+  surface("deflectors", "wall", answer.deflectors);
+  surface("sonotrode", "sonotrode", answer.sonotrode);
+  for (const name of ["holder", "mask"]) surface(name, name, answer[`${name}_triangles`], answer[`${name}_points`], opacity);
+  view.lines("edges", answer.edges.slice(), edges, "wall");
+}
+
 // `answer` gives the triangles of the surface that `named` names, or what the server answers of them.
 export function lights(named, view, answer, colour) {
   let isOn = false, found = null;

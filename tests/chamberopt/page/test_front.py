@@ -172,6 +172,7 @@ def test_a_draft_is_told_before_the_pilots(front: Served, tmp_path: Path) -> Non
     assert 1 <= now["stage"]["number"] <= now["stage"]["count"] == 7
     assert not any("draft" in line or "stage" in line for line in now["lines"])
     assert b'"shape_mm"' in front.ask("/chamber", {})
+    assert b'"unpeened"' in front.ask("/chamber", {"exact": True})
     front.ask("/stop", {})
     while (now := json.loads(front.get("/status").read()))["exit"] is None:
         time.sleep(0.1)

@@ -407,7 +407,7 @@ class View3D {
     renderer.render(this.triad, this.triadCamera);
   }
 
-  // Show what the eye can make out: the part through the sonotrode and without what is below it, dimensions from aside, and of texts that overlap the first.
+  // Show what the eye can make out: the part through the sonotrode and without what is below it but where a section cuts that, dimensions from aside, and of texts that overlap the first.
   #show() {
     const sight = this.camera.getWorldDirection(new THREE.Vector3()), taken = [], all = this.all().map(([, mesh]) => mesh);
     const sonotrode = this.get("sonotrode"), isBelow = this.camera.position.z < 0;
@@ -415,7 +415,7 @@ class View3D {
     for (const mesh of all) {
       const { along } = mesh.userData, isEndOn = along && Math.abs(sight.dot(new THREE.Vector3(...along))) > END_ON;
       const isUnseen = isEndOn || isBelow && mesh === this.get("block");
-      mesh.traverse((one) => { one.layers.set(isUnseen ? 1 : 0); }); // the camera sees the layer 0
+      mesh.traverse((one) => { one.layers.set(isUnseen && !one.userData.stencil ? 1 : 0); }); // the camera sees the layer 0
     }
     const usual = TEXT_HEIGHT * this.element.clientHeight / (2 * halfOf(LENS));
     const height = Math.max(usual, TEXT_PX), scale = 2 * halfOf(this.camera.fov) * height / this.element.clientHeight;
