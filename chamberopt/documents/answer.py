@@ -55,13 +55,16 @@ def answer(result: Result, start: Result | None) -> str:
                 f"{only}Too few dents were simulated to tell how much of the target is covered "
                 f"after {plain(treatment_time)} s."
             )
-        if _is_bound(result.metrics["mean_coverage"]):
-            text = f"After {plain(treatment_time)} s {_least_covered(result)}"
-        else:
-            text = (
-                f"After {plain(treatment_time)} s the target is covered to "
-                f"{mean.format(result.metrics['mean_coverage'])} on average"
+        if _is_bound(known := result.metrics["mean_coverage"]):
+            return (
+                f"After {plain(treatment_time)} s {_least_covered(result)}, and too few dents were "
+                f"simulated to tell the mean, but that it is {known.in_words} (95 % intervals); "
+                f"{full_coverage(result)}."
             )
+        text = (
+            f"After {plain(treatment_time)} s the target is covered to "
+            f"{mean.format(result.metrics['mean_coverage'])} on average"
+        )
         if label.text != mean.text:
             text += f", and its {label.text} is {label.format(result.objective)}"
         return f"{text} (95 % intervals); {full_coverage(result)}."
@@ -120,11 +123,7 @@ def _is_bound(mean: Estimate) -> bool:
 
 def _least_covered(result: Result) -> str:
     least = metric_label("p05_coverage").format(result.metrics["p05_coverage"])
-    mean = result.metrics["mean_coverage"].in_words
-    return (
-        f"95 % of the target's area is covered to {least} or more, from which alone the mean is "
-        f"known to be {mean}"
-    )
+    return f"95 % of the target's area is covered to {least} or more"
 
 
 def answer_lines(result: Result, start: Result | None = None) -> list[AnswerLine]:

@@ -142,12 +142,13 @@ function fillSettle() {
 }
 
 function sayOf({ facts, unpeened, warnings, notes }) {
-  const proposed = state.file.intensity.length && !isUnsaved() ? [["Almen intensity, as proposed", [state.file.intensity]]] : [];
+  const at = facts.findIndex(([subject]) => subject === "simulated"); // none before what the balls reach is known
+  if (state.file.intensity.length && !isUnsaved() && at >= 0) facts = facts.toSpliced(at, 0, ["Almen intensity, as proposed", [state.file.intensity]]);
   const list = (texts) => texts.map((text) => element("li", {}, ...onPage(text)));
   find("unpeened").replaceChildren(...unpeened.map((words) => element("p", { className: "warning" }, ...onPage(words))));
   find("warnings").replaceChildren(...warnings.map(warning));
   find("notes").replaceChildren(...list(notes));
-  find("facts").replaceChildren(...facts.concat(proposed).flatMap(([subject, told]) => [element("dt", { textContent: subject[0].toUpperCase() + subject.slice(1) }),
+  find("facts").replaceChildren(...facts.flatMap(([subject, told]) => [element("dt", { textContent: subject[0].toUpperCase() + subject.slice(1) }),
     ...told.map((words) => element("dd", {}, ...onPage(words)))]));
 }
 

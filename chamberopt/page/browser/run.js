@@ -129,10 +129,11 @@ let study = "";
 export const follow = async (started) => await followed(show, started) ?? {};
 
 // What a command keeps that is stopped, said before it is, and afterwards.
-const KEEPS = { simulate: ["ends it with a result of the replicas that have ended by then, three at least, with wider intervals. With a calibration all must have ended.", "stopped; nothing is kept"],
+const KEEPS = { simulate: ["ends it with a result of the replicas that have ended by then, three at least, with wider intervals.", "stopped; nothing is kept"],
   run: ["ends it after the chambers that are simulated now. What is tried is kept, and Resume goes on.", "stopped; what was tried is kept"],
   sweep: ["ends it at once. What is tried is kept, and the command that is then said goes on in a terminal.", "stopped; what was tried is kept"] };
-const keeps = (command) => KEEPS[command.split(" ")[1]] ?? ["", "stopped"];
+const CALIBRATED = "loses it: the intervals of a design with a calibration take all replicas.";
+const keeps = (command) => command.startsWith("chamberopt simulate ") && state.file.is_calibrated ? [CALIBRATED, KEEPS.simulate[1]] : KEEPS[command.split(" ")[1]] ?? ["", "stopped"];
 
 function show({ command, result, kept, steps, seconds, printed, exit }) {
   if (exit !== null && command.startsWith("chamberopt new ")) return; // of the front page
