@@ -257,20 +257,25 @@ def test_a_click_measures_what_is_round(opened: Page) -> None:
       });
       const mesh = new THREE.Mesh();
       Object.assign(mesh.userData, { points, index });
+      const arc = new THREE.Mesh(); // 120 degrees of the tube
+      Object.assign(arc.userData, { points, index: index.slice(0, 24 * sides / 3) });
       return clicks.map(([name, place]) => {
-        const one = name === "tube" ? mesh : view.get(name), { index } = one.userData;
+        const one = { tube: mesh, arc }[name] ?? view.get(name), { index } = one.userData;
         const near = new THREE.Vector3(...place), away = [];
         for (let k = 0; k < index.length; k += 3) {
           const [a, b, c] = [0, 1, 2].map((i) => Round.corner(one, index[k + i]));
           away.push(a.add(b).add(c).divideScalar(3).distanceTo(near));
         }
-        return Round.of(one, away.indexOf(Math.min(...away)), near)?.diameter ?? 0;
+        const found = Round.of(one, away.indexOf(Math.min(...away)), near);
+        return [found?.diameter ?? 0, Number(found?.isArc ?? false)];
       });
     }"""
     clicks = [["walls", [0, 20, 18]], ["sonotrode", [0, 15, 0]], ["part", [8, 0, 20]]]
     clicks += [["tube", [0, 10, 5]], ["tube", [0, 10, -9]], ["tube", [8.5, 20, 0]]]
-    found = opened.page.evaluate(of, clicks)
-    assert found == pytest.approx([40, 40, 0, 10, 18, 18], rel=1e-3)
+    clicks += [["arc", [3, 10, 4]]]
+    found = np.array(opened.page.evaluate(of, clicks))
+    assert found[:, 0] == pytest.approx([40, 40, 0, 10, 18, 18, 10], rel=1e-3)
+    assert found[:, 1].tolist() == [0, 0, 0, 0, 0, 0, 1]
 
 
 def test_the_legend_hides_a_kind_and_the_view_turns_to_an_axis(opened: Page) -> None:

@@ -1,4 +1,4 @@
-// Measuring by clicks in views: the diameter of what is round, the distance of two clicks with its parts, and how the
+// Measuring by clicks in views: the diameter of what is round, or the radius of less than half of it, the distance of two clicks with its parts, and how the
 // faces clicked stand to each other.
 "use strict";
 class Measure {
@@ -39,7 +39,7 @@ class Measure {
     const first = this.#first?.view === view ? this.#first : null;
     this.#first = first ? null : { view, ...hit };
     const met = Measure.#met(view, event), round = met?.name ? Round.of(view.get(met.name), met.triangle, met.place) : null;
-    const across = round ? [`⌀ ${Measure.number(round.diameter)} mm`] : [], lines = first ? [...Measure.words(first, hit), ...across] : across;
+    const across = !round ? [] : [round.isArc ? `R ${Measure.number(0.5 * round.diameter)} mm` : `⌀ ${Measure.number(round.diameter)} mm`], lines = first ? [...Measure.words(first, hit), ...across] : across;
     this.#show(view, first ? [first.place, hit.place] : [hit.place], lines, round);
     this.tell(first ? lines.join("; ") : [...across, `from ${hit.on} at ${Measure.at(hit.place)}: click the other point`].join("; "));
   }

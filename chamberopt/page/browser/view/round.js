@@ -12,7 +12,7 @@ class Round {
   static TRIED = 6; // facets beside the one that is met, each of which gives an axis
 
   // Circle round the axis of the round surface at a triangle of a mesh, or round border of the flat face there that is
-  // nearest to a place: { diameter, at(angle): a place on it }; null for neither.
+  // nearest to a place: { diameter, isArc: whether less than half of it is there, at(angle): a place on it }; null for neither.
   static of(mesh, triangle, place) {
     const { normals, beside } = Round.facets(mesh), own = place.clone().applyMatrix4(mesh.matrixWorld.clone().invert());
     const facet = (first) => Round.#flood(beside, [first], (k) => normals[k].dot(normals[first]) > Round.FLAT);
@@ -21,7 +21,7 @@ class Round {
       .filter((k) => k >= 0 && !inside.has(k) && normals[k].dot(normals[triangle]) > Round.SMOOTH);
     const round = next.slice(0, Round.TRIED).map((k) => Round.#surface(mesh, [...flat, ...facet(k)], normals[triangle].clone().cross(normals[k]), own));
     const found = round.reduce((best, one) => one && one.count > (best?.count ?? 0) ? one : best, null) ?? Round.#border(mesh, flat, normals[triangle], own);
-    return found && { diameter: 2 * found.radius, at: (angle) => found.at(angle).applyMatrix4(mesh.matrixWorld) };
+    return found && { diameter: 2 * found.radius, isArc: Boolean(found.isArc), at: (angle) => found.at(angle).applyMatrix4(mesh.matrixWorld) };
   }
 
   // Normal of each triangle of a mesh, and the triangle beside each of its sides, -1 at the border; found once.
@@ -67,7 +67,8 @@ class Round {
     const turns = all.map((k) => { const [x, y] = plane.of(normals[k]); return Math.atan2(y, x); }).sort((a, b) => a - b);
     const gap = turns.reduce((most, turn, i) => Math.max(most, (turns[i + 1] ?? turns[0] + 2 * Math.PI) - turn), 0);
     const facets = turns.filter((turn, i) => !i || turn - turns[i - 1] > Round.OTHER).length;
-    return 2 * Math.PI - gap < Round.SWEEP || facets < Round.FACETS ? null : { ...plane.on(circle, place.dot(axis)), count: all.length };
+    return 2 * Math.PI - gap < Round.SWEEP || facets < Round.FACETS ? null
+      : { ...plane.on(circle, place.dot(axis)), count: all.length, isArc: gap > Math.PI };
   }
 
   // The border of a flat face that is nearest to a place, if it is round.
