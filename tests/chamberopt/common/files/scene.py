@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -64,7 +65,10 @@ def remember_all() -> None:
 
 
 def _remember(place: Any, name: str) -> None:
-    """Keep what a function returns, by the design that it is given and by its plain values."""
+    """Keep what a function returns, by the design that it is given and by its plain values.
+
+    The function is replaced wherever it has been imported to.
+    """
     function, known = getattr(place, name), {}
 
     def remembered(*given: Any, **named: Any) -> Any:
@@ -79,4 +83,6 @@ def _remember(place: Any, name: str) -> None:
             known[key] = function(*given, **named)
         return known[key]
 
-    setattr(place, name, remembered)
+    for module in [place, *sys.modules.values()]:
+        if vars(module).get(name) is function:
+            setattr(module, name, remembered)

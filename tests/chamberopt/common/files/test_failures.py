@@ -91,8 +91,10 @@ def every_failure(
             else:
                 message = os.strerror(how[0])
                 assert outcome.errors.count(message) == 1, told
+                # simulate reads what it wrote, to tell its figures, when the result is whole
+                was_read = f"{output}/result.json: cannot be read" in outcome.errors
                 if words not in RESUMED:
-                    assert found == before, told
+                    assert found == (after if was_read else before), told
             assert not list(folder.rglob(".*")), told
             assert names(folder, output) == others, told
             key = json.dumps({name: str(hash(content)) for name, content in found.items()})
