@@ -1,19 +1,26 @@
-"""Small functions for worker processes to import; some count their calls in files of a folder."""
+"""Small functions for worker processes to import; some count their calls in files of a folder.
+
+Few need the packages of the simulator, which take a process two seconds of CPU time to import.
+"""
+
+from __future__ import annotations
 
 import os
 import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import local_executor, share
 from chamberopt.common.limits import limit_cpu_time
-from chamberopt.design.load import Design
-from chamberopt.simulation.evaluation import Evaluation
-from tests.helpers.synthetic import judged
+
+if TYPE_CHECKING:
+    from chamberopt.design.design import Design
+    from chamberopt.simulation.evaluation import Evaluation
 
 
 def mark(folder: Path, name: object) -> None:
@@ -136,6 +143,8 @@ def size_of(counted: Counted, _: int) -> int:
 
 def hill(design: Design, stream: str, replicas: int | None) -> Evaluation:
     """An evaluator for which heavier shot is better up to 6 g; above 9 g it raises InputError."""
+    from tests.helpers.synthetic import judged
+
     mass = design.shot.mass_g
     if mass > 9.0:
         raise InputError(f"shot: {mass:g} g do not fit")
