@@ -4,13 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from chamberopt.chamber.build import build_chamber
 from chamberopt.results.arrays_file import ResultArrays, save_result_arrays
 from chamberopt.results.vtp_files import write_chamber, write_coverage
 from chamberopt.simulation.field_values import complete_result
 from chamberopt.viewer.opened_result import ResultInfo
 from tests.helpers.results.sphere_in_sphere import ball_result
-from tests.helpers.synthetic import plate_design, poisson_evaluation
+from tests.helpers.synthetic import plate_design, plate_evaluation
 
 DESIGN = plate_design()
 
@@ -20,8 +19,7 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> tuple:
     """Folder, chamber, evaluation and complete result of the plate with random dents."""
     folder = tmp_path_factory.mktemp("viewer") / "a plate, simulated"
     folder.mkdir()
-    chamber = build_chamber(DESIGN)
-    evaluation = poisson_evaluation(DESIGN, chamber)
+    chamber, evaluation = plate_evaluation()
     found = complete_result(DESIGN, chamber, evaluation)
     arrays = ResultArrays(chamber, found.element_values, found.display)
     save_result_arrays(folder, arrays)

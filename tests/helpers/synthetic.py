@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from chamberopt.chamber.build import Chamber
+from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.estimate import Estimate, estimate
@@ -198,6 +198,13 @@ def poisson_evaluation(
     return evaluation_of(
         design, chamber, [random_dents(design, chamber, mean, rng) for _ in range(replicas)]
     )
+
+
+@cache
+def plate_evaluation() -> tuple[Chamber, Evaluation]:
+    """The plate's chamber and an evaluation of it with random dents, once in each process."""
+    chamber = build_chamber(plate_design())
+    return chamber, poisson_evaluation(plate_design(), chamber)
 
 
 def evaluation_of(design: Design, chamber: Chamber, hits: Sequence[Hits]) -> Evaluation:

@@ -5,18 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.results.load import load_result
 from chamberopt.results.records import FORMAT
 from chamberopt.workflows import save_run
 from chamberopt.workflows.save_run import save_simulation
 from tests.helpers.results.digests import replace_result
-from tests.helpers.synthetic import plate_design, poisson_evaluation
+from tests.helpers.synthetic import plate_design, plate_evaluation
 
 DESIGN = plate_design()
-CHAMBER = build_chamber(DESIGN)
-EVALUATION = poisson_evaluation(DESIGN, CHAMBER)
 
 
 @pytest.fixture
@@ -41,12 +38,12 @@ def wrong_figures(text: str) -> list[dict]:
 @pytest.mark.usefixtures("no_pictures")
 def test_a_result_can_be_looked_at_without_the_parts_file(tmp_path: Path) -> None:
     folder = tmp_path / "plate"
-    save_simulation(folder, DESIGN, CHAMBER, EVALUATION)
+    save_simulation(folder, DESIGN, *plate_evaluation())
     data = json.loads((folder / "result.json").read_text())
     data["design"]["part"]["mesh"] = "gone.stl"
     replace_result(folder, data)
     assert not load_result(folder).design.part.mesh_path.exists()
-    assert load_result(folder).objective.value == EVALUATION.objective.value
+    assert load_result(folder).objective.value == plate_evaluation()[1].objective.value
 
 
 @pytest.mark.usefixtures("no_pictures")
@@ -63,7 +60,7 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="has not finished"):
         load_result(tmp_path)
     folder = tmp_path / "plate"
-    save_simulation(folder, DESIGN, CHAMBER, EVALUATION)
+    save_simulation(folder, DESIGN, *plate_evaluation())
     text = (folder / "result.json").read_text()
     for damaged in (text[: len(text) // 2], "[]", "{}", text.replace('"metrics"', '"metric"')):
         (folder / "result.json").write_text(damaged)

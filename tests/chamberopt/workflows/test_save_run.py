@@ -23,12 +23,10 @@ from chamberopt.viewer.view_state import ViewState
 from chamberopt.workflows import save_run
 from chamberopt.workflows.save_run import save_simulation, save_study
 from tests.helpers.studies import run_in_folder
-from tests.helpers.synthetic import plate_design, poisson_evaluation
+from tests.helpers.synthetic import plate_design, plate_evaluation, poisson_evaluation
 
 DESIGN = plate_design()
-CHAMBER = build_chamber(DESIGN)
 DOWN = {"direction": [0, 0, -1], "angle_deg": [0, 10]}
-EVALUATION = poisson_evaluation(DESIGN, CHAMBER)
 
 
 @pytest.fixture
@@ -76,7 +74,8 @@ def test_zones_read_back_and_are_shown_from_the_folder_alone(tmp_path: Path) -> 
 @pytest.mark.usefixtures("no_pictures")
 def test_simulation_reads_back(tmp_path: Path) -> None:
     folder = tmp_path / "plate"
-    _, remarks = save_simulation(folder, DESIGN, CHAMBER, EVALUATION)
+    chamber, evaluation = plate_evaluation()
+    _, remarks = save_simulation(folder, DESIGN, chamber, evaluation)
     assert remarks == ["coverage.png skipped: no OpenGL library found"]
     names = {path.name for path in folder.iterdir()}
     assert names == {
@@ -94,25 +93,25 @@ def test_simulation_reads_back(tmp_path: Path) -> None:
     assert result.record.kind == "simulation"
     assert result.design == DESIGN
     assert load_design(folder / "design.toml") == DESIGN
-    assert result.objective == EVALUATION.objective
-    assert result.metrics == EVALUATION.metrics
+    assert result.objective == evaluation.objective
+    assert result.metrics == evaluation.metrics
     assert (
         result.record.part_sha256 == hashlib.sha256(DESIGN.part.mesh_path.read_bytes()).hexdigest()
     )
     assert result.seeds == (DESIGN.process.seed, "search")
-    assert list(CHAMBER.notes) == result.record.notes
+    assert list(chamber.notes) == result.record.notes
     for name in ("python", "chamberopt", "numpy", "numba", "manifold3d", "nlopt"):
         assert result.record.versions[name][0].isdigit()
     assert result.record.timings_s["simulate"] == 1.0
-    assert summary(result) == summary(EVALUATION)
+    assert summary(result) == summary(evaluation)
 
 
 @pytest.mark.usefixtures("no_pictures")
 def test_results_are_never_overwritten(tmp_path: Path) -> None:
-    save_simulation(tmp_path / "plate", DESIGN, CHAMBER, EVALUATION)
+    save_simulation(tmp_path / "plate", DESIGN, *plate_evaluation())
     before = {path.name: path.read_bytes() for path in (tmp_path / "plate").iterdir()}
     with pytest.raises(InputError, match="never overwritten"):
-        save_simulation(tmp_path / "plate", DESIGN, CHAMBER, EVALUATION)
+        save_simulation(tmp_path / "plate", DESIGN, *plate_evaluation())
     assert {path.name: path.read_bytes() for path in (tmp_path / "plate").iterdir()} == before
 
 
@@ -124,12 +123,14 @@ def test_a_study_leaves_everything_and_its_best_design_can_be_used(tmp_path: Pat
         optimizer={"evaluations": 12, "confirm": 2, "confirm_replicas": 4},
     )
 
+    chamber, _ = plate_evaluation()
+
     def simulator(design, stream, replicas):
         if design.chamber.sonotrode_distance_mm > 17:
             raise InputError("not this one")
         # More shot, more dents: the best is at the upper bound.
         return poisson_evaluation(
-            design, CHAMBER, 4.0 * design.shot.mass_g, replicas or 4, seed=len(stream)
+            design, chamber, 4.0 * design.shot.mass_g, replicas or 4, seed=len(stream)
         )
 
     folder = tmp_path / "study"
