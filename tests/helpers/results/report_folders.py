@@ -49,7 +49,7 @@ def studied(folder: Path, evaluations: int = 8) -> Path:
         if design.chamber.sonotrode_distance_mm > 17:
             raise InputError("<b>not</b> this one")
         return poisson_evaluation(
-            design, build_chamber(design), 40.0 * design.shot.mass_g, replicas or 4, len(stream)
+            design, build_chamber(design), 10.0 * design.shot.mass_g, replicas or 4, len(stream)
         )
 
     save_study(folder, run_in_folder(question, folder, SerialExecutor(), simulator=simulator))
