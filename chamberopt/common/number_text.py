@@ -12,7 +12,7 @@ from chamberopt.common.estimate import ZERO_TOLERANCE, Estimate
 
 NEARLY_ALL = 1e-3  # words replace shares that are closer to 1
 MOST_NINES = 6
-ALIKE = 1e-9  # distance of the ends of a range over their size, below which it is rounding
+ALIKE = 1e-4  # distance of the ends of a range over their size, below which they are told alike
 THIN_SPACE = "\u202f"  # gap between thousands, at which no line breaks
 NO_BREAK = "\u00a0"  # a blank at which no line breaks
 # Blanks of an interval, and between a number and its unit.

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 LEAST_SLIT_MM = 0.2  # of both sides of a face, by heart: it vibrates and must touch nothing
 SAME_MM = 0.02  # lengths that differ by less count as equal
 MOST_KEYS = 8  # numbers of the chamber
-LEAST_MISSED = 5e-4  # share of the target out of reach that is told
+LEAST_MISSED = 5e-3  # share of the target out of reach that is told
 
 
 def chamber_limits(result: Result) -> dict[str, tuple[float, float, float]]:

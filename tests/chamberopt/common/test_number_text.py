@@ -40,4 +40,5 @@ def test_words_for_a_share_claim_no_more_than_its_interval(half_width: float) ->
 
 def test_ends_of_a_range_that_rounding_alone_parts_are_one_number() -> None:
     assert range_text(99.9999999999979, 100.0, "%") == "100 %"
+    assert range_text(89.8943, 89.8950, "%") == "89.89 %"
     assert range_text(0.997, 1.0) == "0.9970 to 1.0000"
