@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.checks.fillets import radii_of_target
+from chamberopt.chamber.checks.flat_faces import largest_flat_face
 from chamberopt.chamber.checks.openings import find_openings, mounting, part_is_ceiling
 from chamberopt.chamber.checks.strips import strip_of_target
 from chamberopt.chamber.checks.usual import usual_for_target
@@ -301,6 +302,7 @@ def write_sheet(
             [find_openings(step) for step in chamber.steps[1:]],
             target_level_mm(chamber),
             radii_of_target(design, part),
+            largest_flat_face(part),
             part_is_ceiling(chamber),
         )
         sheet = process_sheet(loaded, built, revision)

@@ -164,6 +164,16 @@ def place_of(one: Opening) -> str:
     return f"({', '.join(map(_side, one.place))})"
 
 
+def _height_of(one: Opening) -> str:
+    """Return in words where the middle of an opening is, from the sonotrode and the room's axis."""
+    x, y, z = map(_side, one.place)
+    beside = [f"{name} = {at}" for name, at in (("x", x), ("y", y))]
+    if one.wall == CEILING:
+        return f"at {' and '.join(beside)} mm from the room's axis"
+    along = int(abs(one.way[1]) < abs(one.way[0]))
+    return f"{z} mm above the sonotrode, at {beside[along]} mm"
+
+
 def _wall_of(one: Opening) -> str:
     """Return in words in which wall an opening is."""
     level = np.hypot(*one.way[:2]) or 1.0  # walls may lean
@@ -184,7 +194,7 @@ def outlines_in_words(clearance_mm: float) -> str:
 def drawn_openings(built: AsBuilt) -> list[tuple[str, Opening]]:
     """Return the openings that are cut along the part's section, each with its place in words."""
     return [
-        (f"{_wall_of(one)}, middle at\n{place_of(one)} mm", one)
+        (f"{_wall_of(one)}, middle\n{_height_of(one)}", one)
         for one in built.openings
         if one.form == "other" and one.outline is not None
     ][:MOST_ROWS]

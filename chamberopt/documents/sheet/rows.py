@@ -13,6 +13,7 @@ from chamberopt.design.tolerances import tolerance_box
 from chamberopt.documents.wording import plain, value_text
 
 if TYPE_CHECKING:
+    from chamberopt.chamber.checks.flat_faces import FlatFace
     from chamberopt.chamber.checks.openings import Mounting, Opening
     from chamberopt.chamber.checks.strips import StripOfTarget
     from chamberopt.chamber.fixture import Plug
@@ -38,12 +39,16 @@ class AsBuilt(NamedTuple):
     later: Sequence[Sequence[Opening]] = ()  # openings in each further step
     level_mm: int | None = None  # of the target above the sonotrode, where strips are set
     radii: Sequence[float] = ()  # of the fillets that are the target [m]
+    flat: FlatFace | None = None  # the part's largest, by which it is seen how it is turned
     is_ceiling: bool = False  # the part closes the room, which has no other ceiling
 
 
 def for_the_shop(text: str) -> str:
-    """Return a text without what is for who designs: commands, options, and sources of rules."""
-    return re.sub(OF_COMMANDS, "", text)
+    """Return a text without what is for who designs: commands, options, and sources of rules.
+
+    Its minus signs are as long as a plus.
+    """
+    return re.sub(r"(?<!\w)-(?=\d)", "−", re.sub(OF_COMMANDS, "", text))
 
 
 def first_rows(rows: Sequence[Row], what: str, most: int = MOST_ROWS) -> Iterator[Row]:

@@ -31,6 +31,7 @@ from chamberopt.documents.sheet.rows import (
     amplitude_text,
     face_in_words,
     first_rows,
+    for_the_shop,
     key_row,
     weighed_g,
     with_limits,
@@ -41,11 +42,13 @@ from chamberopt.documents.wording import per_cent, plain
 from chamberopt.documents.zones import turned
 
 if TYPE_CHECKING:
+    from chamberopt.chamber.checks.flat_faces import FlatFace
     from chamberopt.chamber.checks.openings import Opening
     from chamberopt.chamber.checks.strips import StripOfTarget
     from chamberopt.results.load import Result
 
 LEAST_SLIT_MM = 0.2  # of both sides of a face, by heart: it vibrates and must touch nothing
+SQUARE = 0.9998  # cosine between a face's normal and an axis from which on it looks along the axis
 SAME_MM = 0.02  # lengths that differ by less count as equal
 MOST_KEYS = 8  # numbers of the chamber
 LEAST_MISSED = 5e-3  # share of the target out of reach that is told
@@ -116,7 +119,8 @@ def part_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     else:
         down = axis_down(part.rotate_deg).replace("-", "−")
         pose = [turned(part.rotate_deg) or "as in its file", f"{down} down" if down else ""]
-        yield "turned", ": ".join(filter(None, pose))
+        seen = f"; {_looks(built.flat)}" if built.flat else ""
+        yield "turned", f"{': '.join(filter(None, pose))}{seen}"
         x, y = part.offset_mm
         yield "offset from the axis", f"x {plain(x)} mm, y {plain(y)} mm" if x or y else "none"
         text = f"{plain(result.design.chamber.sonotrode_distance_mm)} mm"
@@ -135,11 +139,26 @@ def part_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         yield "target", area
     # A strip is told in a row of its own.
     chosen = part.target.model_copy(update={} if strip is None else {"box_mm": None})
-    if words := chosen.in_words:
+    if words := for_the_shop(chosen.in_words):
         radii = " and ".join(plain(1e3 * one) for one in built.radii)
         yield "target, chosen by", f"fillets of {radii} mm: {words}" if radii else words
     if strip is not None:
         yield "a strip at a time", _of_strip(strip)
+
+
+def _looks(face: FlatFace) -> str:
+    """Return in words which way a flat face of the part looks in the chamber, and how high."""
+    which = "its largest flat face" if face.is_alone else "one of its largest flat faces"
+    axis = int(np.abs(face.normal).argmax())
+    along, high = face.normal[axis], plain(round(1e3 * abs(face.off), 1))
+    if abs(along) < SQUARE:
+        from_down = plain(round(float(np.degrees(np.arccos(-face.normal[2])))))
+        way = f"{from_down}° from straight down"
+    elif axis == 2:
+        way = f"{'up' if along > 0.0 else 'down'}, {high} mm above the sonotrode"
+    else:
+        way = f"to {'+−'[along < 0.0]}{'xy'[axis]}"
+    return f"{which}, {plain(1e6 * face.area, 3)} mm², looks {way}"
 
 
 def _of_strip(strip: StripOfTarget) -> str:
@@ -298,6 +317,7 @@ def run_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     yield "3 peen", f"{time}: {each} (see Steps){short}" if design.steps else f"{time}{short}"
     yield "4 weigh", "the balls again: what lacks is in a gap or in the part"
     missed = 1.0 - result.record.field.reachable_share
-    but = f" but the {per_cent(missed)} that no ball can touch: see Warnings"
+    share = f"the {per_cent(missed)}" if missed >= 0.005 else "less than 1 %"
+    but = f" but {share} that no ball can touch: see Warnings"
     look = "at the target through a lens of 10 times: no place without dents"
     yield "5 look", look + (but if missed > LEAST_MISSED else "")

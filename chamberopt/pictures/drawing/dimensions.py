@@ -21,8 +21,9 @@ Limits = Mapping[str, tuple[float, float, float]]
 SIZE, WIDTH = 7.0, 0.4  # pt, of the text and of the lines
 SHORT = 9.0  # mm: a shorter dimension has its arrows outside
 STUB = 3.5  # mm, of arrows outside
-# mm, width of a letter, about, and of the arrows and the line beside a text that breaks it
-LETTER, ARROWS = 1.25, 5.0
+# mm, width of a letter, about, and of the arrows and the line beside a text that breaks it; and how
+# far beyond its line a text is that leaves no room for them
+LETTER, ARROWS, BEYOND = 1.25, 5.0, 1.7
 
 
 def dimension(
@@ -38,7 +39,7 @@ def dimension(
 
     Args:
         away: distance of the dimension line below the points, or left of the points if upright.
-        text: text at the line, or behind it where that is short.
+        text: text in the line, beside it where it is as long, or behind it where it is short.
         before: before a short line, to the left or below, not behind it.
     """
 
@@ -54,17 +55,19 @@ def dimension(
             lw=WIDTH,
         )
     arrow = {"lw": WIDTH, "color": DARK_GREY, "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 5.0}
-    middle, stub = x2 - x1 >= max(SHORT, LETTER * len(text) + ARROWS), 0.0
-    if x2 - x1 >= SHORT:
+    middle = x2 - x1 >= SHORT
+    if middle:
         ends = [(x1, x2, "<|-|>")]
+        place = 0.5 * (x1 + x2)
     else:
-        ends, stub = [(x1 - STUB, x1, "-|>"), (x2 + STUB, x2, "-|>"), (x1, x2, "-")], STUB
-    place = 0.5 * (x1 + x2) if middle else x1 - stub - 1.0 if before else x2 + stub + 1.0
+        ends = [(x1 - STUB, x1, "-|>"), (x2 + STUB, x2, "-|>"), (x1, x2, "-")]
+        place = x1 - STUB - 1.0 if before else x2 + STUB + 1.0
+    fits = not middle or x2 - x1 >= LETTER * len(text) + ARROWS
     for a, b, style in ends:
         arrowed = {**arrow, "arrowstyle": style}
         axes.annotate("", turn(b, line), turn(a, line), arrowprops=arrowed, annotation_clip=False)
     inline = {"fc": "white", "ec": "none", "pad": 0.6}
-    x, y = turn(place, line)
+    x, y = turn(place, line if fits else line - past * BEYOND)
     ha = "center" if middle or upright else "right" if before else "left"
     va = "center" if middle or not upright else "top" if before else "bottom"
     rotation = 90.0 if upright else 0.0

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import matters
+from chamberopt.chamber.checks.flat_faces import FlatFace
 from chamberopt.chamber.checks.openings import Opening, part_is_ceiling
 from chamberopt.chamber.checks.strips import StripOfTarget
 from chamberopt.cli import main
@@ -171,6 +172,15 @@ def test_what_a_shop_needs_of_pose_target_strip_and_flanges(folder: Path) -> Non
         design = result.design.changed({"part.rotate_deg": turns})
         rows = rows_of(replace(result, design=design))["Part and pose"]
         assert rows["turned"] == told
+
+    for normal, told in (
+        ((0.0, 0.0, 1.0), "looks up, 52.3 mm above the sonotrode"),
+        ((-1.0, 0.0, 0.0), "looks to −x"),
+        ((0.6, 0.0, -0.8), "looks 37° from straight down"),
+    ):
+        flat = FlatFace(3.2e-3, normal, 0.0523, is_alone=True)
+        turned = dict(setting_tables(result, AsBuilt((50.0,), flat=flat))[0].rows)["turned"]
+        assert turned == f"as in its file: −z down; its largest flat face, 3200 mm², {told}"
 
     faces = ({"at_mm": (1.0, 2.25, -0.04), "alike": True}, {"at_mm": (0.0, 0.0, 0.0)})
     named = result.design.changed({"part.target": {"surface": "root", "faces": faces}})

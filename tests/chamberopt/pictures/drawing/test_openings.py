@@ -29,7 +29,7 @@ def test_outlines_of_openings_are_drawn_with_two_dimensions() -> None:
         at = (0.0, 0.0, 0.1), 0.01, (0.0, 0.0, 1.0)
         one = Opening("the ceiling", (1e-3 * wide, 1e-3 * tall), *at, "other", outline)
         (words, _), *_ = drawn = drawn_openings(AsBuilt((50.0,), [one, one, one]))
-        assert words.startswith("the ceiling, middle at")
+        assert words == "the ceiling, middle\nat x = 0 and y = 0 mm from the room's axis"
         figure = Figure(figsize=(WIDTH / 25.4, HEIGHT / 25.4))
         axes = figure.add_axes((0, 0, 1, 1), xlim=(0, WIDTH), ylim=(0, HEIGHT))
         scale = draw_openings(axes, drawn, MARGIN, 200.0, (180.0, 180.0))
