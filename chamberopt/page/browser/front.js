@@ -163,7 +163,7 @@ find("part").addEventListener("change", () => attempt(() => look(find("part").va
 let drawn = 0, told = ""; // when the picture that is shown was drawn; the proposal that is shown
 function tell({ steps, stage: at, seconds, printed, warnings, fault, exit, picture, result, proposal }) {
   find("made").hidden = false;
-  find("stop").hidden = exit !== null;
+  find("stop-line").hidden = exit !== null;
   find("busy").textContent = exit !== null ? "" : sinceBegin(seconds);
   const isStopped = exit === 130, atEnd = isStopped ? ["Stopped."] : [];
   if (exit !== null || steps.length) find("progress").replaceChildren(...(exit === null ? stage(steps, at) : atEnd));

@@ -37,8 +37,7 @@ function showParts({ quantities, scenes, scales, kinds }) {
   // for times: no place is covered at once.
   function range(all) {
     if (chosen().unit === "%" && !controls.fit.checked) {
-      const isTreated = scenes.every(({ treatment }) => Math.abs(seconds() - treatment) < 1e-3 * treatment);
-      return moves() && isTreated ? [0, 1].map((k) => Math[k ? "max" : "min"](...scenes.map(({ limits }) => limits[k]))) : [0, 100];
+      return moves() && scenes.every(isTreated) ? [0, 1].map((k) => Math[k ? "max" : "min"](...scenes.map(({ limits }) => limits[k]))) : [0, 100];
     }
     const known = Float32Array.from(all.flatMap((one) => Array.from(one.filter(Number.isFinite)))).sort();
     if (!known.length) return [0, 1];
@@ -51,13 +50,15 @@ function showParts({ quantities, scenes, scales, kinds }) {
     return [low, chosen().unit === "%" ? Math.min(high, 100) : high];
   }
 
+  const isTreated = (scene) => Math.abs(seconds() - scene.treatment) < 1e-3 * scene.treatment;
   function mean(scene) {
     const curve = [[0, 0, 0], ...scene.curve], at = seconds();
     const next = curve.findIndex(([time]) => time >= at);
     if (!scene.curve.length || next < 0) return "";
     const [t1, c1, h1] = curve[next], [t0, c0, h0] = curve[Math.max(next - 1, 0)];
     const share = t1 > t0 ? (at - t0) / (t1 - t0) : 1;
-    const [value, halfWidth] = [c0 + share * (c1 - c0), h0 + share * (h1 - h0)].map((x) => (100 * x).toFixed(1));
+    const told = isTreated(scene) && scene.mean.length ? scene.mean : [c0 + share * (c1 - c0), h0 + share * (h1 - h0)];
+    const [value, halfWidth] = told.map((x) => (100 * x).toFixed(1));
     if (halfWidth > 0) return `${value} ± ${halfWidth} %`;
     return value >= 100 ? "more than 99.9 %" : `${value} %`; // known to the last digit
   }
@@ -141,7 +142,7 @@ function showParts({ quantities, scenes, scales, kinds }) {
     rows.push([`coverage of the triangle after ${number(scene.treatment)} s`, `${number(scene.own.coverage[t])} %`],
       ["width of its 95 % interval", `${number(scene.own.interval[t])} %`],
       ["simulated impacts on the triangle", String(scene.impacts[t])]);
-    return { rows, shown, title: `element ${scene.element[t]}, triangle ${scene.number[t]} of the part` };
+    return { rows, shown, place: hit.place, title: `element ${scene.element[t]}, triangle ${scene.number[t]} of the part` };
   }
 
   function point(event, i) {
@@ -164,27 +165,29 @@ function showParts({ quantities, scenes, scales, kinds }) {
     label.style.top = `${Math.max(top, 4)}px`;
   }
 
-  // Places that were clicked, a row each, and buttons to copy and to empty their list.
+  // Places that were clicked, a row each with the number that marks it in the view, and buttons to copy and to empty their list.
   const kept = [], places = find("places"), parts = ["h3", "div", "button", "button"].map((tag) => document.createElement(tag));
   const [title, wide, copy, empty] = parts;
   [title, copy, empty].forEach((one, i) => { one.textContent = ["Places kept", "Copy the list", "Empty it"][i]; });
   wide.className = "wide";
   places.replaceChildren(title, wide, copy, " ", empty);
   function showKept() {
-    const names = [...new Set(kept.flatMap((one) => one.map(([name]) => name)))];
+    const names = [...new Set(kept.flatMap(({ rows }) => rows.map(([name]) => name)))];
     const table = document.createElement("table"), head = table.createTHead().insertRow(), body = table.createTBody();
     for (const name of names) head.append(Object.assign(document.createElement("th"), { textContent: name }));
     for (const one of kept) {
-      const row = body.insertRow(), values = new Map(one);
+      const row = body.insertRow(), values = new Map(one.rows);
       for (const name of names) row.insertCell().textContent = values.get(name) ?? "";
     }
     wide.replaceChildren(table);
     places.hidden = !kept.length;
+    views.forEach((view, i) => view.texts("kept", kept.flatMap((one) => one.scene === i ? [[one.mark, one.place.toArray()]] : [])));
   }
   function keep(event, i) {
-    const { rows, title: triangle } = known(event, i) ?? {};
+    const { rows, place, title: triangle } = known(event, i) ?? {}, mark = String(kept.length + 1);
     if (!rows) return;
-    kept.push([...(scenes.length > 1 ? [["result", scenes[i].title]] : []), ["triangle", triangle], ...rows]);
+    const result = scenes.length > 1 ? [["result", scenes[i].title]] : [];
+    kept.push({ scene: i, place, mark, rows: [["mark", mark], ...result, ["triangle", triangle], ...rows] });
     showKept();
   }
   empty.addEventListener("click", () => { kept.length = 0; showKept(); });

@@ -146,7 +146,13 @@ def test_pointing_at_the_target_shows_its_numbers_and_the_triangles(shown: OpenP
     assert shown.page.locator("#places tbody tr").count() == 1
     assert shown.page.locator("#places").is_visible()
     kept = shown.page.locator("#places").inner_text()
-    for name in ("element", "simulated impacts on the triangle", "place x, y, z", "90° is head on"):
+    for name in (
+        "mark",
+        "element",
+        "simulated impacts on the triangle",
+        "place x, y, z",
+        "90° is head on",
+    ):
         assert name in kept
 
 
