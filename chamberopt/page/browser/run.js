@@ -140,9 +140,9 @@ function show({ command, result, kept, steps, seconds, printed, exit }) {
   const before = study;
   study = exit === null && isStudy(command) ? result : "";
   if (study && study !== before) tell("study", study);
-  find("stop").disabled = exit !== null || isStopping;
-  find("stop-keeps").textContent = exit !== null ? "" : isStopping ? "stopping …" : `Stop ${keeps(command)[0]}`;
-  isStopping &&= exit === null;
+  find("stop").disabled = exit !== null || isStoppedNow();
+  find("stop-keeps").textContent = exit !== null ? "" : stopped ? STOPPING : `Stop ${keeps(command)[0]}`;
+  if (exit !== null) sayStopped(0);
   isRunning = exit === null;
   allow();
   const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? kept ? "stopped; what was simulated until then is a result" : keeps(command)[1] : `ended with exit status ${exit}`;
@@ -183,13 +183,21 @@ find("more-of").addEventListener("click", () => attempt(async () => {
   await read(); // the further study is a file of its own
   await followToEnd(started);
 }, find("run-fault")));
-// A second stop would lose what the first keeps.
-let isStopping = false;
-find("stop").addEventListener("click", () => attempt(async () => {
-  isStopping = find("stop").disabled = true;
-  find("stop-keeps").textContent = "stopping …";
+// A second stop loses what the first keeps: its button says so, and takes no double click.
+const STOPPING = "stopping …; Stop now does not wait, and loses what is not written yet.", DOUBLE = 3000; // ms
+let stopped = 0; // when it was asked; 0 for not
+export const isStoppedNow = () => stopped > 0 && performance.now() - stopped < DOUBLE;
+function sayStopped(at) {
+  stopped = at;
+  for (const id of ["stop", "study-stop"]) find(id).textContent = at ? "Stop now" : "Stop";
+}
+export const stop = () => attempt(async () => {
+  sayStopped(performance.now());
+  find("stop").disabled = find("study-stop").disabled = true;
+  find("stop-keeps").textContent = STOPPING;
   await ask("/stop", {});
-}));
+});
+find("stop").addEventListener("click", stop);
 // What was refused is no longer said once something else is asked.
 const unsay = () => { find("run-fault").textContent = find("search-fault").textContent = ""; };
 find("run").addEventListener("input", unsay);

@@ -1,6 +1,6 @@
 // Following a study: its candidates as plots while it runs and afterwards, and each one's chamber in the view.
 import { ask, attempt, change, element, onPage, say, show } from "../state.js";
-import { followToEnd, running } from "../run.js";
+import { followToEnd, isStoppedNow, running, stop } from "../run.js";
 import { Plot, parallel } from "./plots.js";
 
 const EVERY = 2000; // ms between looks at a study
@@ -68,7 +68,7 @@ async function look() {
   }
   const ours = running() === mine;
   find("study-progress").hidden = !ours;
-  find("study-stop").disabled = !ours;
+  find("study-stop").disabled = !ours || isStoppedNow();
   find("study-resume").disabled = Boolean(running()) || Boolean(data?.finished);
   find("study-result").disabled = !data?.finished;
   find("study-more").disabled = Boolean(running()) || !data?.candidates.length;
@@ -246,7 +246,7 @@ async function choose(number) {
   show(one.values, `candidate ${data.candidates[number - 1].name} is shown`);
 }
 
-find("study-stop").addEventListener("click", () => attempt(() => ask("/stop", {})));
+find("study-stop").addEventListener("click", stop);
 find("study-resume").addEventListener("click", () => attempt(async () => goOn(await ask("/resume", { folder }))));
 find("study-more").addEventListener("click", () => attempt(async () => {
   goOn(await ask("/more", { folder, evaluations: Number(find("more-evaluations").value) }));
