@@ -141,16 +141,10 @@ def find_bevels(faces: Faces, vertices: np.ndarray, triangles: np.ndarray) -> np
         faces: of the surface, as its sharp edges part them.
         vertices, triangles: of the surface [m], (n, 3) and (m, 3).
     """
-    normals = unit_vectors(area_vectors(vertices, triangles))
-    one, two = side_pairs(triangles).T  # a side begins at its corner, the other one ends there
-    of, beyond = faces.of_triangle[one // 3], faces.of_triangle[two // 3]
-    corners = vertices[triangles]
-    along = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 3)[one]
+    sides, along, turn = _hollow_turns(vertices, triangles)
+    of, beyond = (faces.of_triangle[one // 3] for one in sides.T)
     long = np.linalg.norm(along, axis=1) * (of != beyond)
-    first, second = normals[one // 3], normals[two // 3]
-    turn = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", first, second), -1.0, 1.0)))
-    is_hollow = np.einsum("ij,ij->i", np.cross(first, second), along) < 0.0
-    bevelled = is_hollow & (BEVEL_DEG[0] < turn) & (turn < BEVEL_DEG[1]) & (long > 0.0)
+    bevelled = (BEVEL_DEG[0] < turn) & (turn < BEVEL_DEG[1]) & (long > 0.0)
     border, hollow = (
         np.bincount(of, x, faces.count) + np.bincount(beyond, x, faces.count)
         for x in (long, long * bevelled)
@@ -160,6 +154,38 @@ def find_bevels(faces: Faces, vertices: np.ndarray, triangles: np.ndarray) -> np
     beside = bevelled & is_bevel[of] & is_bevel[beyond]
     is_bevel[of[beside]] = is_bevel[beyond[beside]] = False
     return np.flatnonzero(is_bevel)
+
+
+def hollow_edges(vertices: np.ndarray, triangles: np.ndarray, least_deg: float) -> np.ndarray:
+    """Return the ends of the sides at which a surface is hollow and sharp, (k, 2, 3) [m].
+
+    Args:
+        vertices, triangles: of the surface [m], (n, 3) and (m, 3).
+        least_deg: by which it turns there at least [degrees].
+    """
+    sides, along, turn = _hollow_turns(vertices, triangles)
+    start = vertices[triangles].reshape(-1, 3)[sides[:, 0]]
+    return np.stack([start, start + along], axis=1)[turn > least_deg]
+
+
+def _hollow_turns(
+    vertices: np.ndarray, triangles: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the pairs of sides of a surface, and by which angle it turns there to be hollow.
+
+    Returns:
+        Corners at which the one side begins and the other one ends, (e, 2).
+        The one side, from its beginning to its end, (e, 3) [m].
+        Angle [degrees], below 0 where the surface bulges, (e,).
+    """
+    normals = unit_vectors(area_vectors(vertices, triangles))
+    sides = side_pairs(triangles)
+    corners = vertices[triangles]
+    along = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 3)[sides[:, 0]]
+    first, second = normals[sides // 3].swapaxes(0, 1)
+    turn = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", first, second), -1.0, 1.0)))
+    bulges = np.einsum("ij,ij->i", np.cross(first, second), along) >= 0.0
+    return sides, along, np.where(bulges, -turn, turn)
 
 
 def least_curvature(vertices: np.ndarray) -> float:

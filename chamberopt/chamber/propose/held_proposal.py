@@ -22,7 +22,7 @@ from chamberopt.chamber.layout.floor import Floor
 from chamberopt.chamber.layout.grip import thin_grip
 from chamberopt.chamber.layout.holder import end_holder, holder_choices
 from chamberopt.chamber.layout.sizes import LONG
-from chamberopt.chamber.layout.target import Target
+from chamberopt.chamber.layout.target import CREASE_DEG, Target
 from chamberopt.chamber.propose.proposal import (
     HarmError,
     Proposal,
@@ -44,6 +44,7 @@ from chamberopt.chamber.shop import Shop
 from chamberopt.common.errors import InputError, UnreadableError
 from chamberopt.common.progress import Progress
 from chamberopt.design.fixture import USUAL_SHELL_MM
+from chamberopt.geometry.face_shapes import hollow_edges
 
 MOST_HOLDERS = 6  # that are tried
 CLEAR = 1.5  # distance of a mask from the target, over the diameter of a ball
@@ -238,6 +239,12 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
         f"hardly touch here, such as at {place} in the chamber: agree on it, or take smaller balls "
         "(--ball-mm)"
     )
+    if _is_at_sharp_roots(made, left):
+        text = (
+            f"ROOTS ARE SHARP IN THE FILE, {left_out:.1%} of the target, such as at {place} in the "
+            "chamber, and no ball gets into them: draw the radius that the part has there, or "
+            "agree on it"
+        )
     if (radius := _narrow_fillets(made, left)) > 0.0:
         text = (
             f"FILLETS ARE LEFT OUT, of about {1e3 * radius:.2g} mm, {left_out:.1%} of the target, "
@@ -283,6 +290,29 @@ def _where_left(made: Proposal, left: np.ndarray) -> str:
         if radius < NARROW * max(made.design.shot.diameters):  # wider ones keep no ball out
             words.append(f"in hollows of about {1e3 * radius:.2g} mm")
     return f"mostly {' '.join(words)}, " if words else ""
+
+
+def _is_at_sharp_roots(made: Proposal, left: np.ndarray) -> bool:
+    """Return whether most of what is left out is within a ball of hollow edges without a radius.
+
+    Args:
+        left: that of _narrow_fillets.
+    """
+    from scipy.spatial import cKDTree
+
+    part, ball = made.chamber.part, min(made.design.shot.diameters)
+    edges = hollow_edges(part.vertices, part.triangles, CREASE_DEG)
+    if not len(edges):
+        return False
+    long = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
+    counts = np.ceil(long / (FINE * ball)).astype(int) + 1
+    own = np.repeat(np.arange(len(edges)), counts)
+    share = (np.arange(len(own)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[own]
+    places = edges[own, 0] + share[:, None] * (edges[own, 1] - edges[own, 0])
+    rows = np.flatnonzero(left > 0.0)
+    corners = part.vertices[part.triangles[rows]].reshape(-1, 3)
+    near = cKDTree(places).query(corners)[0].reshape(-1, 3).min(axis=1) < ball
+    return bool(left[rows[near]].sum() > MOSTLY * left.sum())
 
 
 def _narrow_fillets(made: Proposal, left: np.ndarray) -> float:

@@ -250,4 +250,5 @@ def test_what_no_ball_touches_of_a_coarse_weld_is_left_out(tmp_path: Path) -> No
     part, wide = made.chamber.part, 7.0 * np.sqrt(2.0)
     left = float(part.area[part.target].sum())
     within = wide - 2.0 * np.tan(np.radians(22.5))
+    assert "ROOTS ARE SHARP IN THE FILE" in made.reasons["part.target.reachable"]
     assert 1e6 * left == pytest.approx(2.0 * 60.0 * within, rel=0.02)
