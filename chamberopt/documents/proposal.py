@@ -342,7 +342,7 @@ def _poses(made: Proposal) -> Table:
         strong = f"{plain(one.intensity.value, 2)} mmA" if one.intensity else "not known"
         row = [one.pose, _after(one), strong]
         row += [str(one.sonotrode_count)] * several + [str(one.settings)] * turns
-        rows.append([*row, one.outcome])
+        rows.append([*row, one.outcome or ("slower" if one.time_to_98 else "no pilot")])
     text = "Poses that pilots compared, before balls and amplitude were chosen"
     return Table(text, head, rows, numbers=False)
 

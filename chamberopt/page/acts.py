@@ -347,7 +347,7 @@ class Acts:
             "chosen": {name: _chosen(design, name) for name in picked_surfaces(design)},
             "is_proposed": file.is_proposed,
             "is_calibrated": design.calibration is not None,
-            "intensity": on_page(file.proposed_intensity),
+            "intensity": [on_page(text) for text in file.proposed_intensity],
             "of_matters": OF_MATTERS,
             "is_drawn": design.chamber.setup() is not None,
             "files": _files_beside(file.path),

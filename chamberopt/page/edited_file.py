@@ -156,15 +156,15 @@ class EditedFile:
         return PROPOSED in self.text.partition("\n")[0]
 
     @property
-    def proposed_intensity(self) -> str:
-        """The Almen intensity that was proposed, beside what is usual; "" if that may hold no more.
+    def proposed_intensity(self) -> list[str]:
+        """The Almen intensity that was proposed, and what is usual; [] if that may hold no more.
 
         It stands behind a wanted intensity, or in a line of its own.
         """
         found = INTENSITY_LINE.search(self.text)
         if not self.is_proposed or found is None or CHANGED in self.text or SINCE in self.text:
-            return ""
-        return "; ".join((found[1] or found[2]).split("; ")[:2])
+            return []
+        return (found[1] or found[2]).split("; ")[:2]
 
     def with_steps(self, kept: Sequence[int]) -> EditedFile:
         """Return the file as it would be with some of its steps alone.

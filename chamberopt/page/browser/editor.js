@@ -143,7 +143,7 @@ function fillSettle() {
 
 function sayOf({ facts, unpeened, warnings, notes }) {
   const at = facts.findIndex(([subject]) => subject === "simulated"); // none before what the balls reach is known
-  if (state.file.intensity.length && !isUnsaved() && at >= 0) facts = facts.toSpliced(at, 0, ["Almen intensity, as proposed", [state.file.intensity]]);
+  if (state.file.intensity.length && !isUnsaved() && at >= 0) facts = facts.toSpliced(at, 0, ["Almen intensity, as proposed", state.file.intensity]);
   const list = (texts) => texts.map((text) => element("li", {}, ...onPage(text)));
   find("unpeened").replaceChildren(...unpeened.map((words) => element("p", { className: "warning" }, ...onPage(words))));
   find("warnings").replaceChildren(...warnings.map(warning));

@@ -60,9 +60,9 @@ def test_the_proposed_intensity_is_told_while_the_numbers_are_those(file: Edited
     line = "\n# Almen intensity: expected 0.4 mmA; 0.3-0.41A are usual; to aim at it: ask\n"
     file.path.write_text(head + text + line)
     proposed = EditedFile(file.path, False)
-    assert proposed.proposed_intensity == "expected 0.4 mmA; 0.3-0.41A are usual"
+    assert proposed.proposed_intensity == ["expected 0.4 mmA", "0.3-0.41A are usual"]
     proposed.save({"chamber.height_mm": 40})
-    assert EditedFile(file.path, False).proposed_intensity == ""
+    assert EditedFile(file.path, False).proposed_intensity == []
 
 
 def test_what_is_to_be_settled_says_which_values_it_was_told_of(file: EditedFile) -> None:
