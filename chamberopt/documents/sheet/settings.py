@@ -152,8 +152,8 @@ def _looks(face: FlatFace) -> str:
     axis = int(np.abs(face.normal).argmax())
     along, high = face.normal[axis], plain(round(1e3 * abs(face.off), 1))
     if abs(along) < SQUARE:
-        from_down = plain(round(float(np.degrees(np.arccos(-face.normal[2])))))
-        way = f"{from_down}° from straight down"
+        aside = plain(round(math.degrees(math.acos(abs(face.normal[2])))))
+        way = f"{aside}° from straight {'up' if face.normal[2] > 0.0 else 'down'}"
     elif axis == 2:
         way = f"{'up' if along > 0.0 else 'down'}, {high} mm above the sonotrode"
     else:

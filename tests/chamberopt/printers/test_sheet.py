@@ -177,6 +177,7 @@ def test_what_a_shop_needs_of_pose_target_strip_and_flanges(folder: Path) -> Non
         ((0.0, 0.0, 1.0), "looks up, 52.3 mm above the sonotrode"),
         ((-1.0, 0.0, 0.0), "looks to −x"),
         ((0.6, 0.0, -0.8), "looks 37° from straight down"),
+        ((0.6, 0.0, 0.8), "looks 37° from straight up"),
     ):
         flat = FlatFace(3.2e-3, normal, 0.0523, is_alone=True)
         turned = dict(setting_tables(result, AsBuilt((50.0,), flat=flat))[0].rows)["turned"]
