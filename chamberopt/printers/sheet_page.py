@@ -21,6 +21,7 @@ from chamberopt.chamber.checks.openings import find_openings, mounting, part_is_
 from chamberopt.chamber.checks.strips import strip_of_target
 from chamberopt.chamber.checks.usual import usual_for_target
 from chamberopt.chamber.fixture import plugs_of
+from chamberopt.chamber.layout.grip import outside_clamp
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, private_folder, write_bytes
 from chamberopt.common.number_text import held_together
@@ -304,6 +305,7 @@ def write_sheet(
             radii_of_target(design, part),
             largest_flat_face(part),
             part_is_ceiling(chamber),
+            outside_clamp(chamber).text,
         )
         sheet = process_sheet(loaded, built, revision)
         limits = slit_limits(loaded) | chamber_limits(loaded) | reference_limits(loaded, openings)

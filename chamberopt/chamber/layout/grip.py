@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from chamberopt.chamber.layout.end import DEEP
 from chamberopt.chamber.layout.target import area_in_mm2, nearest_axis
+from chamberopt.common.number_text import plain
 from chamberopt.geometry.cut import cut_at_box, facets
 from chamberopt.geometry.faces import Faces
-from chamberopt.geometry.outline import convex_hull, frame_along, narrowest_rectangle
+from chamberopt.geometry.outline import convex_hull, fitted_circle, frame_along, narrowest_rectangle
 from chamberopt.geometry.thickness import depth_below
 from chamberopt.geometry.triangles import centre_of_mass, unit_normals
+from sim_core import computed_once
+
+if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
 
 FLAT_DEG = 1.0  # largest angle in a flat face: fillets beside it are no part of it
 # Flat faces looked at for jaws; least area of each [m²]; of two, share of all that stands out, and
 # how far apart they are over the part's size: no vice takes a shaft by its ends.
 MOST_FLAT, LEAST_JAW, LEAST_OF_ALL, JAWS_OPEN = 20, 30e-6, 0.15, 0.8
+SEEN_OUT = 1e-3  # m by which a part stands out of a side
+# Of a round face: how far its corners may be off a circle, over its radius, and the sum of its area
+# vectors over its area.
+OFF_ROUND, ALL_WAYS = 0.02, 0.2
+# Faces that are looked at for it, which end where they turn by so much; cosine up to which a face
+# is a side; and least share of a round's surface that a keyway and facets leave.
+MOST_FACES, CREASE_DEG, LEVEL, SLOTTED = 8, 30.0, 0.02, 0.8
 # An end is too thin to hold a part by if half of the metal between the jaws is thinner than this,
 # [m] or over the part's least size, and the centre of mass lies further beyond them than so many
 # lengths of the grip. Metal is measured to so much [m]; sides of an end lean by less than a cosine.
@@ -29,6 +43,8 @@ class Clamp(NamedTuple):
 
     text: str  # empty if nothing is named
     is_shallow: bool = False  # true if jaws reach less deep than they need
+    # Along which jaws press on flat faces, a unit vector in the frame of the vertices.
+    way: tuple[float, float, float] | None = None
 
 
 def flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) -> Clamp:
@@ -73,7 +89,8 @@ def flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) 
             if is_shallow:
                 text += f"; SHALLOW GRIP, {1e3 * depth:.2g} mm of these faces: jaws need "
                 text += f"{1e3 * DEEP:g} mm"
-            found = Clamp(text, is_shallow)
+            x, y, z = ways[0].tolist()
+            found = Clamp(text, is_shallow, (x, y, z))
     return found
 
 
@@ -90,6 +107,92 @@ def _depth(corners: np.ndarray, way: np.ndarray, area: float) -> float:
         return 0.0
     long, short = narrowest_rectangle(hull)[1]
     return float(min(short, area / long))
+
+
+def sides_out(chamber: Chamber) -> list[str]:
+    """Return the sides at which a part stands out of its chamber, such as "+x", sorted."""
+    part = chamber.part
+    low, high = (end(chamber.vertices, axis=0) for end in (np.min, np.max))
+    beyond = high - part.vertices.max(axis=0), part.vertices.min(axis=0) - low
+    signs = zip(("+", "-"), beyond, strict=True)
+    return sorted(
+        f"{sign}{'xyz'[k]}" for sign, room in signs for k in range(3) if room[k] < -SEEN_OUT
+    )
+
+
+def free_outside(chamber: Chamber) -> np.ndarray:
+    """Return what of each triangle of a part stands out of its chamber and may be clamped [m²].
+
+    What is buried in another body of the part, or under a mask, is not outside.
+    """
+    part = chamber.part
+    low, high = (end(chamber.vertices, axis=0) for end in (np.min, np.max))
+    corners = part.vertices[part.triangles]
+    is_beyond = ((corners < low) | (corners > high)).any(axis=(1, 2))
+    return np.where(is_beyond & ~part.target, part.area - chamber.exposed_area, 0.0)
+
+
+@computed_once(4)
+def outside_clamp(chamber: Chamber) -> Clamp:
+    """Return what a part that stands out of its chamber is clamped by there, by its form.
+
+    It is two flat faces that jaws reach far over, or else the largest round. The text is empty if
+    there is neither.
+    """
+    part, outside = chamber.part, free_outside(chamber)
+    jaws = flat_jaws(part.vertices, part.triangles, outside)
+    if jaws.text and not jaws.is_shallow:
+        return jaws
+    axes = {"xyz".index(side[-1]) for side in sides_out(chamber)}
+    if radius := _round_end(part.vertices, part.triangles, outside, axes):
+        return Clamp(f"a collet or vee blocks round its diameter of {plain(2e3 * radius)} mm")
+    return jaws
+
+
+def _round_end(
+    vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray, axes: Iterable[int]
+) -> float:
+    """Return the radius [m] of the largest round that stands out of a chamber; 0 without any.
+
+    Args:
+        vertices, triangles: the part, (n, 3) [m] and (m, 3).
+        outside: area of each triangle that may be clamped [m²], (m,).
+        axes: numbers of the axes along which it stands out.
+    """
+    faces, corners = Faces(vertices, triangles, CREASE_DEG), vertices[triangles]
+    normals, found = unit_normals(corners), [(0.0, 0.0)]
+    for axis in axes:
+        aside = np.where(np.abs(normals[:, axis]) < LEVEL, outside, 0.0)
+        areas = np.bincount(faces.of_triangle, aside, faces.count)
+        for face in np.argsort(-areas, kind="stable")[:MOST_FACES]:
+            own = np.where(faces.of_triangle == face, aside, 0.0)
+            found.append((float(areas[face]), _round_radius(corners, own, axis)))
+    return max((one for one in found if one[1] > 0.0), default=(0.0, 0.0))[1]
+
+
+def _round_radius(corners: np.ndarray, outside: np.ndarray, axis: int) -> float:
+    """Return the radius [m] of what stands out if it is a round about an axis; 0 if it is none.
+
+    All of it is as far from the axis, it goes all round, it is no bore, and it is long enough for a
+    clamp.
+
+    Args:
+        corners: of all triangles of the part [m], (m, 3, 3).
+        outside: area of each that belongs to the surface and may be clamped [m²], (m,).
+        axis: number of the axis.
+    """
+    own = outside > 0.0
+    if not own.any():
+        return 0.0
+    across = np.delete(corners[own], axis, axis=2).reshape(-1, 2)
+    middle, radius = fitted_circle(across)
+    off = np.abs(np.linalg.norm(across - middle, axis=1) - radius).max()
+    normal, area = np.delete(unit_normals(corners[own]), axis, axis=1), outside[own]
+    is_even = np.linalg.norm(area @ normal) < ALL_WAYS * area.sum()
+    aside = np.delete(corners[own].mean(axis=1), axis, axis=1) - middle
+    is_outer = float(area @ (normal * aside).sum(axis=1)) > 0.0
+    is_long = float(area.sum()) >= 2.0 * math.pi * radius * DEEP * SLOTTED
+    return radius if off < OFF_ROUND * radius and is_even and is_outer and is_long else 0.0
 
 
 class ThinGrip(NamedTuple):

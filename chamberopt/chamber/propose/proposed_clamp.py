@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
 
@@ -11,28 +10,18 @@ from chamberopt.chamber.checks.openings import find_openings, mounting
 from chamberopt.chamber.checks.place_names import CEILING, surface_names
 from chamberopt.chamber.layout.end import DEEP
 from chamberopt.chamber.layout.floor import Floor
-from chamberopt.chamber.layout.grip import Clamp, flat_jaws
+from chamberopt.chamber.layout.grip import Clamp, free_outside, outside_clamp, sides_out
 from chamberopt.chamber.layout.target import apart, area_in_mm2, named_or_all
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.propose.proposal import Proposal, checked, with_table
 from chamberopt.chamber.propose.proposed_mask import rows_of
 from chamberopt.chamber.shop import Shop
-from chamberopt.common.number_text import plain
 from chamberopt.design.fixture import WIDEST_GAP, tight_gap_mm
-from chamberopt.geometry.faces import Faces
-from chamberopt.geometry.outline import fitted_circle, frame_along
-from chamberopt.geometry.triangles import unit_normals
+from chamberopt.geometry.outline import frame_along
 
 MILLED_MM = 0.2  # between a part and a wall that is milled or printed round it
 ROUNDING = 1e-9  # of a clearance over its step
-SEEN_OUT = 1e-3  # m by which a part stands out of a side
 MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area over the largest
-# Of a round face: how far its corners may be off a circle, over its radius, and the sum of its area
-# vectors over its area.
-OFF_ROUND, ALL_WAYS = 0.02, 0.2
-# Faces that are looked at for it, which end where they turn by so much; cosine up to which a face
-# is a side; and least share of a round's surface that a keyway and facets leave.
-MOST_FACES, CREASE_DEG, LEVEL, SLOTTED = 8, 30.0, 0.02, 0.8
 # Of a part that turns: ball diameters between it and the walls, so that no ball is jammed there,
 # and m between its axis and the middle of an opening.
 FREE, OFF_AXIS = 1.0, 2e-4
@@ -45,8 +34,9 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     tables = with_table(made.tables, "sonotrode", "holder", keys)
     by = f" by {clamp.text}" if (clamp := _clamp(made)).text else ""
     holds = "clamped" if made.design.effects.part_turn is None else "chucked, and turned,"
+    sides = ", ".join(sides_out(made.chamber))
     text = (
-        f"{holds} where it stands out of the chamber at {', '.join(_sides_out(made))}{by}; the "
+        f"{holds} where it stands out of the chamber at {sides}{by}; the "
         f"wall, cut out {clearance_mm:g} mm round it so that no ball passes, "
         f"{_mounting(made, 1e-3 * clearance_mm)}"
     )
@@ -96,7 +86,7 @@ def _mounting(made: Proposal, clearance: float) -> str:
     """
     chamber = made.chamber
     ways = {mounting(chamber.part, one, clearance) for one in find_openings(chamber)}
-    side = "above" if _sides_out(made) == ["+z"] else "outside"
+    side = "above" if sides_out(made.chamber) == ["+z"] else "outside"
     if "split" in ways or not ways:
         return "is split there"
     how = f"the part goes in from {side}"
@@ -127,7 +117,7 @@ def _is_cut_all_round(made: Proposal) -> bool:
     if "z" in made.closed or not (surface_names(made.chamber) == CEILING).any():
         return False
     closed = {f"+{one}".replace("+-", "-") for one in made.closed}
-    through = {side[-1] for side in _sides_out(made) if side not in closed}
+    through = {side[-1] for side in sides_out(made.chamber) if side not in closed}
     return {"x", "y"} <= through
 
 
@@ -144,23 +134,11 @@ def bore_clearance_mm(ball: float) -> float:
 def _clamp(made: Proposal) -> Clamp:
     """Return what a part that stands out of its chamber is clamped by there.
 
-    It is two flat faces that jaws reach far over, or else the largest round, or else surfaces by
-    name.
+    It is what `outside_clamp` finds, or else surfaces by name.
     """
-    chamber, part = made.chamber, made.chamber.part
-    low, high = (end(chamber.vertices, axis=0) for end in (np.min, np.max))
-    # What is buried in another body of the part, or under a mask, is not outside.
-    corners = part.vertices[part.triangles]
-    is_beyond = ((corners < low) | (corners > high)).any(axis=(1, 2))
-    outside = np.where(is_beyond & ~part.target, part.area - chamber.exposed_area, 0.0)
-    jaws = flat_jaws(part.vertices, part.triangles, outside)
-    if jaws.text and not jaws.is_shallow:
-        return jaws
-    axes = {"xyz".index(side[-1]) for side in _sides_out(made)}
-    if radius := _round_end(part.vertices, part.triangles, outside, axes):
-        return Clamp(f"a collet or vee blocks round its diameter of {plain(2e3 * radius)} mm")
-    if jaws.text:
-        return jaws
+    outside = free_outside(made.chamber)
+    if (found := outside_clamp(made.chamber)).text:
+        return found
     known = [
         (one, np.where(rows_of(made.design, one.keys), outside, 0.0))
         for one in named_or_all(made.known)
@@ -169,60 +147,3 @@ def _clamp(made: Proposal) -> Clamp:
     most = [(one, area) for one, area in areas if area > JAW_SHARE * areas[0][1]]
     named = (f"{one.name} ({area_in_mm2(area)} of it)" for one, area in most[:MOST_JAWS])
     return Clamp(", ".join(named))
-
-
-def _sides_out(made: Proposal) -> list[str]:
-    """Return the sides at which a part stands out of its chamber, such as "+x", sorted."""
-    chamber, part = made.chamber, made.chamber.part
-    low, high = (end(chamber.vertices, axis=0) for end in (np.min, np.max))
-    beyond = high - part.vertices.max(axis=0), part.vertices.min(axis=0) - low
-    signs = zip(("+", "-"), beyond, strict=True)
-    return sorted(
-        f"{sign}{'xyz'[k]}" for sign, room in signs for k in range(3) if room[k] < -SEEN_OUT
-    )
-
-
-def _round_end(
-    vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray, axes: Iterable[int]
-) -> float:
-    """Return the radius [m] of the largest round that stands out of a chamber; 0 without any.
-
-    Args:
-        vertices, triangles: the part, (n, 3) [m] and (m, 3).
-        outside: area of each triangle that may be clamped [m²], (m,).
-        axes: numbers of the axes along which it stands out.
-    """
-    faces, corners = Faces(vertices, triangles, CREASE_DEG), vertices[triangles]
-    normals, found = unit_normals(corners), [(0.0, 0.0)]
-    for axis in axes:
-        aside = np.where(np.abs(normals[:, axis]) < LEVEL, outside, 0.0)
-        areas = np.bincount(faces.of_triangle, aside, faces.count)
-        for face in np.argsort(-areas, kind="stable")[:MOST_FACES]:
-            own = np.where(faces.of_triangle == face, aside, 0.0)
-            found.append((float(areas[face]), _round_radius(corners, own, axis)))
-    return max((one for one in found if one[1] > 0.0), default=(0.0, 0.0))[1]
-
-
-def _round_radius(corners: np.ndarray, outside: np.ndarray, axis: int) -> float:
-    """Return the radius [m] of what stands out if it is a round about an axis; 0 if it is none.
-
-    All of it is as far from the axis, it goes all round, it is no bore, and it is long enough for a
-    clamp.
-
-    Args:
-        corners: of all triangles of the part [m], (m, 3, 3).
-        outside: area of each that belongs to the surface and may be clamped [m²], (m,).
-        axis: number of the axis.
-    """
-    own = outside > 0.0
-    if not own.any():
-        return 0.0
-    across = np.delete(corners[own], axis, axis=2).reshape(-1, 2)
-    middle, radius = fitted_circle(across)
-    off = np.abs(np.linalg.norm(across - middle, axis=1) - radius).max()
-    normal, area = np.delete(unit_normals(corners[own]), axis, axis=1), outside[own]
-    is_even = np.linalg.norm(area @ normal) < ALL_WAYS * area.sum()
-    aside = np.delete(corners[own].mean(axis=1), axis, axis=1) - middle
-    is_outer = float(area @ (normal * aside).sum(axis=1)) > 0.0
-    is_long = float(area.sum()) >= 2.0 * math.pi * radius * DEEP * SLOTTED
-    return radius if off < OFF_ROUND * radius and is_even and is_outer and is_long else 0.0

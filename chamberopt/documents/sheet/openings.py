@@ -41,7 +41,8 @@ def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         play = "tight"
         if holder.clearance_mm:
             play = f"{plain(holder.clearance_mm)} mm of clearance all round, in the sizes below"
-        yield "holder", f"the part itself, out through the wall, {play}"
+        by = f"; clamped by {built.clamp.replace(' -', ' −')}" if built.clamp else ""
+        yield "holder", f"the part itself, out through the wall, {play}{by}"
     mask = result.design.mask
     if holder is None and not result.record.chamber.pieces_in_air:
         padded = mask is not None and mask.axis is not None and not openings
@@ -111,9 +112,13 @@ def clearance_of(result: Result) -> float:
     return 0.0 if holder is None else holder.clearance
 
 
-def ends_walls(openings: Sequence[Opening]) -> bool:
-    """Return whether side walls end on the part, which lies on them and so sets their height."""
-    return any(one.wall != CEILING and _is_end(one) for one in openings)
+def walls_end_at(openings: Sequence[Opening]) -> float | None:
+    """Return the height [m] at which side walls end on the part that lies on them; None if none do.
+
+    There the room is as high as the walls, and the part begins.
+    """
+    ends = [one for one in openings if one.wall != CEILING and _is_end(one)]
+    return min((one.place[2] - 0.5 * one.size[1] for one in ends), default=None)
 
 
 def _is_end(one: Opening) -> bool:
@@ -126,7 +131,7 @@ def lid_in_words(built: AsBuilt) -> str:
     openings, mountings = built.openings, built.mountings
     if "split" in mountings:
         return f"the split of its walls; {FILLED}"
-    if built.is_ceiling or ends_walls(openings):
+    if built.is_ceiling or walls_end_at(openings) is not None:
         return f"the part, which lifts off; {FILLED}"
     if not any(one.wall == CEILING for one in openings):
         return f"the ceiling, which lifts off; {FILLED}"

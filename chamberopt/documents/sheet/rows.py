@@ -41,6 +41,7 @@ class AsBuilt(NamedTuple):
     radii: Sequence[float] = ()  # of the fillets that are the target [m]
     flat: FlatFace | None = None  # the part's largest, by which it is seen how it is turned
     is_ceiling: bool = False  # the part closes the room, which has no other ceiling
+    clamp: str = ""  # what clamps the part where it stands out, in words
 
 
 def for_the_shop(text: str) -> str:

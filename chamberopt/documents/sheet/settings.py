@@ -19,11 +19,11 @@ from chamberopt.documents.answer import answer_lines
 from chamberopt.documents.sheet.openings import (
     FOLLOWS,
     clearance_of,
-    ends_walls,
     fixture_rows,
     lid_in_words,
     opening_in_words,
     place_of,
+    walls_end_at,
 )
 from chamberopt.documents.sheet.rows import (
     AsBuilt,
@@ -67,7 +67,8 @@ def chamber_limits(result: Result) -> dict[str, tuple[float, float, float]]:
 def slit_limits(result: Result) -> dict[str, tuple[float, float, float]]:
     """Return value, least and largest value of each key of [chamber] as wide as the sonotrode.
 
-    A wall round the sonotrode's face stands beside it by a slit, which is not simulated.
+    A wall round the sonotrode's face stands beside it by a slit, which is not simulated. The slit
+    is no wider than half a ball even where the wall is not centred, but for the finest balls.
     """
     face, chamber = result.design.sonotrode.face, result.design.chamber
     if face is None:
@@ -76,10 +77,10 @@ def slit_limits(result: Result) -> dict[str, tuple[float, float, float]]:
     sides = {"diameter_mm": face.diameter_mm}
     if face.diameter_mm is None:
         sides = {"length_mm": long, "width_mm": wide}
-    slit = 2.0 * slit_mm(1e3 * min(result.design.ball_diameters))
-    least = min(LEAST_SLIT_MM, 0.5 * slit)
+    slit = slit_mm(1e3 * min(result.design.ball_diameters))
+    least, most = min(LEAST_SLIT_MM, slit), max(slit, min(2.0 * slit, 2.0 * LEAST_SLIT_MM))
     return {
-        key: (side, side + least, side + slit)
+        key: (side, side + least, side + most)
         for key, side in sides.items()
         if side is not None and abs(getattr(chamber, key, math.inf) - side) < SAME_MM
     }
@@ -93,10 +94,11 @@ def reference_limits(
     Then the height of the walls and the distance from the sonotrode to the part differ by a length
     of the part, and only one of them can have a tolerance.
     """
-    height = getattr(result.design.chamber, "height_mm", None)
-    if height is None or not ends_walls(openings):
+    height, end = getattr(result.design.chamber, "height_mm", None), walls_end_at(openings)
+    if height is None or end is None:
         return {}
-    return {"height_mm": (height, height, height)}
+    end_mm = round(1e3 * end, 2)
+    return {"height_mm": (height, end_mm, end_mm)}
 
 
 def _over_face(result: Result) -> str:
@@ -136,7 +138,8 @@ def part_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         speed = swing if turn.rpm is None else f"{plain(turn.rpm)} turns a minute"
         yield "turns", f"{speed} about the file's axis ({axis})"
     if area := exposed_target(result):
-        yield "target", area
+        without = ", without what no ball touches" if part.target.reachable else ""
+        yield "target", f"{area}{without}"
     # A strip is told in a row of its own.
     chosen = part.target.model_copy(update={} if strip is None else {"box_mm": None})
     if words := for_the_shop(chosen.in_words):
@@ -193,12 +196,16 @@ def chamber_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     for key in ("sonotrode_distance_mm", "facets", "mesh", "unit"):
         table.pop(key, None)
     counted = {key: table.pop(key, ()) for key in ("holes", "deflectors")}
-    rows, follows = [], reference_limits(result, built.openings)
+    rows, slits = [], slit_limits(result)
+    follows = reference_limits(result, built.openings)
     for key, value in table.items():
         if value not in (0, 0.0, []):
             name, text = key_row(key, value)
             if key in follows:
-                rows.append((name, f"({text}): {FOLLOWS}"))
+                rows.append((name, f"({plain(follows[key][1])} mm): {FOLLOWS}"))
+            elif key in slits:
+                low, high = (plain(one) for one in slits[key][1:])
+                rows.append((name, f"{low} to {high} mm, centred round the face of {text}"))
             else:
                 rows.append((name, with_limits(result, f"chamber.{key}", text)))
     yield from first_rows(rows, "numbers", MOST_KEYS)
@@ -225,12 +232,6 @@ def sonotrode_rows(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
         yield "stands on", f"{face.in_words}{alike}"
     metal = design.materials.sonotrode.alloy
     yield "face in the chamber", face_in_words(face_mm) + (f", {metal}" if metal else "")
-    if limits := slit_limits(result):
-        sides = [
-            f"{in_words(key)} {plain(low)} to {plain(high)} mm, so that it is clear of the face"
-            for key, (_, low, high) in limits.items()
-        ]
-        yield "wall round the face", "; ".join(sides)
     gap = slit_in_words(1e3 * min(design.ball_diameters))
     if over := _over_face(result):
         least = plain(0.5 * LEAST_SLIT_MM)
@@ -290,6 +291,17 @@ def step_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
             yield from first_rows([(f"opening, step {number}", one) for one in found], "openings")
 
 
+def _set_by(built: AsBuilt) -> str:
+    """Return in words by what an operator sets how far a part is from the sonotrode."""
+    if walls_end_at(built.openings) is not None:
+        return "it lies on the walls, which set its distance"
+    above = [one.beyond for one in built.openings if one.wall == CEILING]
+    if above:
+        out = plain(round(1e3 * max(above), 1))
+        return f"it stands {out} mm out, from the ceiling's inner side to its top: measure that"
+    return "measure from it to the face at rest"
+
+
 def run_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     """Yield what an operator does for each part, in its order.
 
@@ -297,7 +309,7 @@ def run_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     there before it.
     """
     design = result.design
-    mount = "the part as above; measure from it to the face at rest"
+    mount = f"the part as above; {_set_by(built)}"
     if design.effects.part_turn is not None:
         mount = "the part and its drive; turn it once by hand: it touches no wall"
     steps = [*design.in_steps.values()]

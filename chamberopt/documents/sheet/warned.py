@@ -132,11 +132,11 @@ def tolerance_rows(result: Result, openings: Sequence[Opening] = ()) -> Iterator
     If the tolerances were simulated, further rows give their effect on coverage etc.
     """
     box = tolerance_box(result.design)
-    follows = [f"chamber.{key}" for key in reference_limits(result, openings)]
+    follows = reference_limits(result, openings)
     for name, (low, high) in box.items():
         designed = plain(result.design.value(name))
-        if name in follows:
-            yield title_with_unit(name), f"({designed}): {FOLLOWS}"
+        if reference := follows.get(name.removeprefix("chamber.")):
+            yield title_with_unit(name), f"({plain(reference[1])}): {FOLLOWS}"
             continue
         yield title_with_unit(name), f"{plain(low)} to {plain(high)}, as designed {designed}"
     found = result.record.tolerances

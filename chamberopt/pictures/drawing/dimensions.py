@@ -100,7 +100,7 @@ def with_limits(text: str, length: float, limits: Limits, *keys: str) -> str:
         value, low, high = limits.get(key, (math.inf, 0.0, 0.0))
         if abs(value - length) < SAME:
             if low == high:
-                return reference(text)
+                return reference(plain(low))
             down, up = value - low, high - value
             if abs(up - down) < 1e-9 * value:
                 return f"{text} ±{plain(up)}"

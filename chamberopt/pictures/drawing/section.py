@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.chamber.fixture import size_in_words
+from chamberopt.chamber.layout.grip import outside_clamp
 from chamberopt.common.number_text import typeset_plain as plain
 from chamberopt.design.shape_surface import TAG_SONOTRODE, TAG_WALL
 from chamberopt.pictures.charts.colours import BLACK, BLUE, DARK_GREY, FIXTURE_COLOURS, SONOTRODE
@@ -40,6 +41,7 @@ JAWS_FROM, JAWS_LONG, JAWS_THICK = 2.5, 4.0, 2.0
 # They are drawn where the part's sides are parallel, at so many places, within so many mm on paper.
 JAW_PLACES, JAWS_OFF = 5, 0.2
 JAWS = "xxxxxx"  # their hatch
+PRESSED = 0.9  # cosine from which on jaws press along an axis
 # mm on paper from the walls to the first dimension of a height, and to each further one.
 FIRST_ROW, ROWS = 4.0, 4.2
 CROSS = 4.0  # mm on paper, of the lines that cross in the middle of an opening
@@ -73,7 +75,7 @@ def draw_section(
     look: Any = {"facecolor": PART, "edgecolor": DARK_GREY, "hatch": "////", "lw": 0.5}
     fill(axes, view, inside(1e3 * own), window, **look)
     _draw_breaks(axes, view, own)
-    has_jaws = "holder" not in chamber.fixtures and _draw_jaws(axes, view, own)
+    has_jaws = "holder" not in chamber.fixtures and _draw_jaws(axes, chamber, view, own)
     tags, target = chamber.tags[row], chamber.on_target[row]
     draw_lines(axes, view, lines[tags == TAG_WALL], BLACK, 1.1)
     draw_lines(axes, view, lines[tags > TAG_WALL], SONOTRODE, 2.5)
@@ -110,6 +112,12 @@ def draw_section(
     if abs(high - lowest) < SAME:  # the part is the ceiling
         total = reference(plain(high))
     heights = _draw_centres(axes, chamber, view, planes, [lowest, high])
+    if "holder" in chamber.fixtures and any(heights.values()):  # its axis is what is made
+        text = reference(plain(lowest))
+        heights = {
+            side: [(z, _as_far(z, lowest, limits)) for z, _ in found]
+            for side, found in heights.items()
+        }
     for way, wall, out, rows in (
         (-1, view.low, sides[0], [(lowest, text), *heights[-1]]),
         (1, view.high, sides[1], [*heights[1], (high, total)]),
@@ -120,6 +128,18 @@ def draw_section(
             end = x, view.place([0.0, height])[1]
             dimension(axes, (x, y), end, away, words, upright=True)
     return has_jaws
+
+
+def _as_far(height: float, lowest: float, limits: Limits) -> str:
+    """Return the text of the height of a holder's axis, with the tolerance of the part's distance.
+
+    Args:
+        height, lowest: of the axis and of the part's lowest point [mm].
+    """
+    value, *ends = limits.get("sonotrode_distance_mm", (lowest, lowest, lowest))
+    low, high = (height + end - value for end in ends)
+    shown = plain(round(height, 1))
+    return with_limits(shown, height, {"": (height, low, high)}, "") if high > low else shown
 
 
 def _draw_centres(
@@ -176,10 +196,11 @@ def _draw_breaks(axes: Axes, view: View, lines: np.ndarray) -> None:
             axes.plot(x, y, color=BLACK, lw=0.6)
 
 
-def _draw_jaws(axes: Axes, view: View, lines: np.ndarray) -> bool:
+def _draw_jaws(axes: Axes, chamber: Chamber, view: View, lines: np.ndarray) -> bool:
     """Draw jaws at both sides of a part, wherever it stands far enough out of the chamber.
 
-    There its sides have to be parallel. Return whether there are any jaws.
+    There its sides have to be parallel. Where flat faces are clamped, jaws are on these alone.
+    Return whether there are any jaws.
 
     Args:
         lines: lines of the part's section, (k, 2, 2) [m].
@@ -187,13 +208,16 @@ def _draw_jaws(axes: Axes, view: View, lines: np.ndarray) -> bool:
     from matplotlib.patches import Rectangle
 
     (left, right, above), has_jaws = view.outside, False
+    pressed = outside_clamp(chamber).way
     low, high = view.place([view.low, view.high])
     ends = view.place(1e3 * lines)
     beyond = ends.min(axis=(0, 1)), ends.max(axis=(0, 1))
     ways = (0, low[0], -1.0, left), (0, high[0], 1.0, right), (1, high[1], 1.0, above)
     for axis, wall, way, drawn in ways:
         stands_out = way * (beyond[int(way > 0.0)][axis] - wall)
-        if min(drawn, stands_out) < JAWS_FROM + JAWS_LONG:
+        press = 2 if axis == 0 else view.right
+        is_held = pressed is None or abs(pressed[press]) > PRESSED
+        if not is_held or min(drawn, stands_out) < JAWS_FROM + JAWS_LONG:
             continue
         start = wall + way * JAWS_FROM
         zone = np.linspace(start, start + way * JAWS_LONG, JAW_PLACES)

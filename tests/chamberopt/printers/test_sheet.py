@@ -211,15 +211,15 @@ def test_what_a_shop_needs_of_pose_target_strip_and_flanges(folder: Path) -> Non
 def test_the_slit_round_the_sonotrode_is_in_the_dimensions(folder: Path) -> None:
     """The wall goes round a face as wide as the floor, and stands on a larger one."""
     result = load_result(folder)
-    for face, want in (({"diameter_mm": 50.0}, "Ø 50 +3/+0.2"), ({"diameter_mm": 60.0}, "Ø 50")):
+    for face, want in (({"diameter_mm": 50.0}, "Ø 50 +1.5/+0.2"), ({"diameter_mm": 60.0}, "Ø 50")):
         design = result.design.changed({"sonotrode.face": face})
         limits = slit_limits(replace(result, design=design))
         axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
         draw_chamber(axes, build_chamber(design), 0.0, 100.0, (180.0, 100.0), limits)
         assert want in [one.get_text() for one in axes.texts]
-        told = rows_of(replace(result, design=design))["Sonotrode"].get("wall round the face")
-        is_round = "diameter 50.2 to 53 mm, so that it is clear of the face"
-        assert told == (is_round if "/" in want else None)
+        told = rows_of(replace(result, design=design))["Chamber"]["diameter"]
+        is_round = "50.2 to 51.5 mm, centred round the face of 50 mm"
+        assert told == (is_round if "/" in want else "50 mm")
     assert slit_limits(result) == {}
 
 
@@ -466,7 +466,7 @@ def test_a_part_that_lies_on_the_walls_leaves_one_tolerance(folder: Path) -> Non
     design = result.design.changed({"tolerances": box})
     result = replace(result, design=design)
     top = Opening("the ceiling", (0.03, 0.04), (0.0, 0.0, 0.02), 0.01, (0.0, 0.0, 1.0))
-    edge = Opening("the wall", (0.04, 0.0), (0.02, 0.0, 0.02), 0.02, (1.0, 0.0, 0.0), "edge")
+    edge = Opening("the wall", (0.04, 4e-4), (0.02, 0.0, 0.0198), 0.02, (1.0, 0.0, 0.0), "edge")
     for openings, lid in (
         ((), "the ceiling, which lifts off; balls go in and out there"),
         ((top, edge), "the part, which lifts off; balls go in and out there"),
@@ -478,12 +478,15 @@ def test_a_part_that_lies_on_the_walls_leaves_one_tolerance(folder: Path) -> Non
         follows = edge in openings
         assert rows["Chamber"]["opened at"] == lid
         assert rows["Chamber"]["height"].startswith(
-            "(20 mm): follows" if follows else "20 mm (19.7"
+            "(19.6 mm): follows" if follows else "20 mm (19.7"
         )
         told = rows["Tolerances"]["Chamber height [mm]"]
-        assert told.startswith("(20): follows" if follows else "19.7 to 20.3")
+        assert told.startswith("(19.6): follows" if follows else "19.7 to 20.3")
+        mount = rows["To peen a part"]["1 mount" if not openings else "2 mount"]
+        assert ("it lies on the walls" in mount) == follows
+        assert ("it stands 10 mm out" in mount) == (openings == (top,))
         limits = chamber_limits(result) | reference_limits(result, openings)
-        assert with_limits("20", 20.0, limits, "height_mm") == ("(20)" if follows else "20 ±0.3")
+        assert with_limits("20", 20.0, limits, "height_mm") == ("(19.6)" if follows else "20 ±0.3")
     ceiling = {
         one.caption: dict(one.rows)
         for one in setting_tables(result, AsBuilt((50.0,), is_ceiling=True))

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from manifold3d import Manifold
 
-from chamberopt.chamber.layout.grip import Clamp, flat_jaws, thin_grip
+from chamberopt.chamber.layout.grip import Clamp, _round_end, _round_radius, flat_jaws, thin_grip
 from chamberopt.chamber.propose.text import clauses
 
 
@@ -84,3 +84,39 @@ def test_both_jaws_together_close_on_enough_of_what_stands_out(share: float, is_
     outside = np.where(across, share / 2.0, np.where(above, (1.0 - 2.0 * share) / 2.0, 0.0))
     jaws = flat_jaws(1e-3 * bar.vertices, bar.faces, 0.015 * outside)
     assert bool(jaws.text) == is_held
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_journal_is_round_and_splines_and_bores_are_not(axis: int) -> None:
+    tube = trimesh.creation.annulus(12.0, 20.0, 15.0, sections=48)
+    turned = np.roll(tube.triangles, axis - 2, axis=2)
+    radius = np.linalg.norm(tube.triangles_center[:, :2], axis=1)
+    level = np.abs(tube.face_normals[:, 2]) > 0.9
+    area = 1e-6 * tube.area_faces
+    for marked, is_round in [
+        (~level & (radius > 15.0), True),
+        (~level & (radius < 15.0), False),  # a bore
+        (level, False),
+        (~level & (radius > 15.0) & (tube.triangles_center[:, 0] > 0.0), False),  # half of it
+    ]:
+        outside = np.where(marked, area, 0.0)
+        radius_mm = 1e3 * _round_radius(1e-3 * turned, outside, axis)
+        assert radius_mm == pytest.approx(20.0 if is_round else 0.0, rel=1e-3)
+    shank = ~level & (radius > 15.0)
+    low = np.where(np.arange(3) == axis, 0.3, 1.0) * 1e-3  # 4.5 mm long
+    assert not _round_radius(low * turned, np.where(shank, 0.3 * area, 0.0), axis)
+
+
+def test_a_shank_with_a_key_and_an_end_face_is_held_by_its_diameter() -> None:
+    """A shank of 20 x 30 mm along z with a key of 6 x 6 x 15 mm on it."""
+    shank = trimesh.creation.cylinder(10.0, 30.0, sections=64)
+    key = trimesh.creation.box((6.0, 6.0, 15.0))
+    key.apply_translation((9.0, 0.0, 0.0))
+    body = trimesh.boolean.union([shank, key], engine="manifold")
+    outside = np.where(body.triangles_center[:, 2] > -14.0, 1e-6 * body.area_faces, 0.0)
+    vertices, triangles = 1e-3 * body.vertices, np.asarray(body.faces)
+    assert 1e3 * _round_end(vertices, triangles, outside, [2]) == pytest.approx(10.0, rel=1e-3)
+    assert _round_end(vertices, triangles, outside, [0]) == 0.0
+    square = trimesh.creation.box((20.0, 20.0, 30.0))
+    sides = 1e-6 * square.area_faces
+    assert _round_end(1e-3 * square.vertices, np.asarray(square.faces), sides, [2]) == 0.0

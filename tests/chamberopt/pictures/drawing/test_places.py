@@ -1,6 +1,7 @@
 """Walls are drawn round the room, and what stands beside its middle has its place dimensioned."""
 
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -8,10 +9,14 @@ import trimesh
 from matplotlib.figure import Figure
 
 from chamberopt.chamber.build import Chamber, build_chamber
+from chamberopt.chamber.layout.grip import Clamp, outside_clamp
+from chamberopt.pictures.drawing import section
 from chamberopt.pictures.drawing.arrangement import WALL, arrangement
 from chamberopt.pictures.drawing.centres import Centre, centres, distinct, gaps
 from chamberopt.pictures.drawing.chamber import draw_chamber
 from chamberopt.pictures.drawing.cuts import section_planes
+from chamberopt.pictures.drawing.dimensions import Limits
+from chamberopt.pictures.drawing.section import JAWS
 from chamberopt.pictures.drawing.walls import LID, WALLS
 from tests.helpers.synthetic import plate_design
 
@@ -29,10 +34,12 @@ def room_with(
     return build_chamber(plate_design().changed({"part": mesh, "chamber": chamber, **more}))
 
 
-def texts_of(chamber: Chamber) -> tuple[list[str], dict[str, float]]:
+def texts_of(
+    chamber: Chamber, limits: Limits = MappingProxyType({})
+) -> tuple[list[str], dict[str, float]]:
     """The texts of its drawing at 1:1, and the area of what has each hatch [mm²]."""
     axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
-    draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0))
+    draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0), limits)
     found: dict[str, float] = {}
     for one in axes.patches:
         if one.get_hatch():
@@ -67,6 +74,9 @@ def test_what_is_in_the_middle_has_no_dimension_but_along_its_holder(tmp_path: P
     assert one.place == pytest.approx((5.0, 0.0, 15.0), abs=1e-3)
     assert gaps(chamber, 0) == [pytest.approx((-20.0, -5.0))]
     assert gaps(chamber, 1) == []
+    # The distance of the part follows from the height of the axis, which has its tolerance.
+    texts, _ = texts_of(chamber, {"sonotrode_distance_mm": (10.0, 9.8, 10.3)})
+    assert {"15 +0.3/−0.2", "(10)"} <= {*texts}
     assert distinct([3.0, 1.0, 3.02], known=[1.0]) == [3.0]
 
 
@@ -80,3 +90,19 @@ def test_a_part_is_broken_off_before_a_hole_beyond_the_chamber(tmp_path: Path) -
         found = arrangement(chamber, section_planes(chamber), (190.0, 70.0))
         assert found.scale == 1.0
         assert found.outside[0] == pytest.approx((15.0, right, 0.0), abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("way", "are_drawn"), [(None, True), ((0.0, 0.0, -1.0), True), ((0.0, 1.0, 0.0), False)]
+)
+def test_jaws_are_drawn_on_the_faces_that_are_clamped(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    way: tuple[float, float, float] | None,
+    are_drawn: bool,
+) -> None:
+    """A bar along x, out at both sides: the section along it shows what is above and below."""
+    chamber = room_with(trimesh.creation.box((90.0, 9.0, 19.0)), tmp_path, (0.0, 0.0))
+    assert np.abs(outside_clamp(chamber).way or 0.0) == pytest.approx([0.0, 1.0, 0.0])
+    monkeypatch.setattr(section, "outside_clamp", lambda _: Clamp("", way=way))
+    assert (JAWS in texts_of(chamber)[1]) == are_drawn
