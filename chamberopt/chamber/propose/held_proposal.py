@@ -239,9 +239,9 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
         f"hardly touch here, such as at {place} in the chamber: agree on it, or take smaller balls "
         "(--ball-mm)"
     )
-    if _is_at_sharp_roots(made, left):
+    if root := _sharp_root(made, left):
         text = (
-            f"ROOTS ARE SHARP IN THE FILE, {left_out:.1%} of the target, such as at {place} in the "
+            f"ROOTS ARE SHARP IN THE FILE, {left_out:.1%} of the target, such as at {root} in the "
             "chamber, and no ball gets into them: draw the radius that the part has there, or "
             "agree on it"
         )
@@ -292,8 +292,10 @@ def _where_left(made: Proposal, left: np.ndarray) -> str:
     return f"mostly {' '.join(words)}, " if words else ""
 
 
-def _is_at_sharp_roots(made: Proposal, left: np.ndarray) -> bool:
-    """Return whether most of what is left out is within a ball of hollow edges without a radius.
+def _sharp_root(made: Proposal, left: np.ndarray) -> str:
+    """Return a place in words on a hollow edge without a radius, beside which balls are kept out.
+
+    It is empty unless most of what is left out lies within a ball of such edges.
 
     Args:
         left: that of _narrow_fillets.
@@ -303,7 +305,7 @@ def _is_at_sharp_roots(made: Proposal, left: np.ndarray) -> bool:
     part, ball = made.chamber.part, min(made.design.shot.diameters)
     edges = hollow_edges(part.vertices, part.triangles, CREASE_DEG)
     if not len(edges):
-        return False
+        return ""
     long = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     counts = np.ceil(long / (FINE * ball)).astype(int) + 1
     own = np.repeat(np.arange(len(edges)), counts)
@@ -311,8 +313,12 @@ def _is_at_sharp_roots(made: Proposal, left: np.ndarray) -> bool:
     places = edges[own, 0] + share[:, None] * (edges[own, 1] - edges[own, 0])
     rows = np.flatnonzero(left > 0.0)
     corners = part.vertices[part.triangles[rows]].reshape(-1, 3)
-    near = cKDTree(places).query(corners)[0].reshape(-1, 3).min(axis=1) < ball
-    return bool(left[rows[near]].sum() > MOSTLY * left.sum())
+    away, nearest = cKDTree(places).query(corners)
+    near = away.reshape(-1, 3).min(axis=1) < ball
+    if left[rows[near]].sum() <= MOSTLY * left.sum():
+        return ""
+    used = np.unique(nearest[away < ball])
+    return one_of(places[used], np.ones(len(used)))
 
 
 def _narrow_fillets(made: Proposal, left: np.ndarray) -> float:

@@ -446,7 +446,7 @@ def _told(
     if made.reasons["shot.diameter_mm"] == by_geometry:
         ball = f"{by_geometry}; {ball}"
     else:
-        ball += f", among balls that serve the target, up to {largest:g} mm: {by_geometry}"
+        ball += f"; by the target's form alone {largest:g} mm: {by_geometry}"
     reasons["shot.diameter_mm"] = ball
     return with_prediction(replace(made, reasons=reasons), wanted, predicted, more)
 

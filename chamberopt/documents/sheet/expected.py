@@ -136,11 +136,14 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
     # If the mean coverage at the end is not resolved, its curve is not reliable either.
     if row and share.has_number:
         over = ""
+        text = estimate_text(share, 100.0, "%")
         if row.time_s < end:
             share = Estimate(row.mean_coverage, row.half_width)
             over = _over_ranges(result, row.time_s)
             after = f"{plain(row.time_s, 3)} s"
-        text = estimate_text(share, 100.0, "%")
+            text = (
+                f"{rounded(100.0 * share.value, 2)} %" if over else estimate_text(share, 100.0, "%")
+            )
         yield f"mean coverage of the target after {after}", f"{text}{over}"
     intensity = result.metrics.get("almen_intensity")
     if intensity is None:
