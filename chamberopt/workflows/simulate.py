@@ -194,7 +194,7 @@ def simulate_design(
         if settings.tolerances:
             evaluation, found = simulate_tolerances(*what, settings.analytic)
         else:
-            evaluation = _evaluated(*what, settings.plan, cavity, teller)
+            evaluation = evaluate_until_stopped(*what, settings.plan, cavity, teller)
     if settings.ranges and evaluation.stopped_by != "user":
         try:
             ranges = simulate_ranges(design, chamber, evaluation, executor, teller, then)
@@ -206,7 +206,7 @@ def simulate_design(
     return Simulated(design, chamber, evaluation, spreads, advice, *saved)
 
 
-def _evaluated(
+def evaluate_until_stopped(
     design: Design,
     chamber: Chamber,
     executor: Executor,

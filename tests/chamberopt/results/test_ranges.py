@@ -239,7 +239,7 @@ def test_an_end_that_cannot_be_simulated_is_told(
     monkeypatch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
     monkeypatch.setattr("chamberopt.workflows.simulate.simulate_ranges", stopped)
     monkeypatch.setattr(
-        "chamberopt.workflows.simulate.evaluate_calibrated",
+        "chamberopt.workflows.simulate.evaluate_until_stopped",
         lambda design, chamber, *_: poisson_evaluation(design, chamber, PER_MM2),
     )
     result = chamberopt.simulate(DESIGN, tmp_path / "out", workers=1)

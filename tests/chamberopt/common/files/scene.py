@@ -14,10 +14,9 @@ from chamberopt.chamber.checks import check
 from chamberopt.cli import main
 from chamberopt.common import executor
 from chamberopt.common.files import write_bytes
-from chamberopt.peening import calibration_errors
 from chamberopt.pictures import subprocess_drawing
 from chamberopt.search.run_study import ChamberSimulator
-from chamberopt.workflows import ranges, save_run
+from chamberopt.workflows import ranges, save_run, simulate
 from tests.hunt.base import write_base
 
 TINY = {"simulated_time_s": "0.02", "warmup_time_s": "0.001", "replicas": "3", "mass_g": "0.5"}
@@ -52,7 +51,7 @@ def remember_all() -> None:
     """Do what compile_all does, and compute nothing again that it has computed."""
     _remember(build, "build_chamber")
     _remember(save_run, "complete_result")
-    _remember(calibration_errors, "evaluate_calibrated")
+    _remember(simulate, "evaluate_until_stopped")
     _remember(ranges, "simulate_ends")
     _remember(ChamberSimulator, "__call__")
     os.fsync = lambda _: None  # the disk is slow, and no power cut is tested

@@ -39,7 +39,14 @@ class Simulations:
     done: list[tuple[Design, dict[str, Any]]] = field(default_factory=list)
 
     def evaluate(
-        self, design: Design, chamber: Any, executor: Any, progress: Any, plan: Any, cavity: Any
+        self,
+        design: Design,
+        chamber: Any,
+        executor: Any,
+        progress: Any,
+        plan: Any,
+        cavity: Any,
+        _: Any,
     ) -> Any:
         how = {**vars(plan), "replicas": plan.count, "cavity": cavity}
         self.done.append((design, how))
@@ -53,7 +60,7 @@ class Simulations:
 @pytest.fixture
 def simulations(monkeypatch: pytest.MonkeyPatch) -> Simulations:
     found = Simulations()
-    monkeypatch.setattr(simulate, "evaluate_calibrated", found.evaluate)
+    monkeypatch.setattr(simulate, "evaluate_until_stopped", found.evaluate)
     monkeypatch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
     return found
 
