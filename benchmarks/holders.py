@@ -17,7 +17,7 @@ from chamberopt.design.load import load_design
 from chamberopt.pictures.drawing.chamber import draw_chamber
 
 ROOT = Path(__file__).resolve().parents[1]
-WIDE, TALL = 150.0, 62.0  # mm on the page, of each drawing
+WIDE, TALL = 160.0, 76.0  # mm on the page, of each drawing
 SHAFT = {"direction": (0, 0, 1), "angle_deg": (80, 100), "radius_mm": (6, 9)}
 END_FACES = {"direction": (0, 0, 1), "angle_deg": (0, 10), "box_mm": ((-23, -23, 9), (23, 23, 11))}
 CASES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
