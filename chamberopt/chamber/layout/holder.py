@@ -51,7 +51,7 @@ WIDER, SHORTEST, LONGEST = 2.0, 0.25, 0.4
 # An end narrows if its outer TIP, a share of the grip, is slimmer than STRAIGHT of the whole grip.
 TIP, STRAIGHT = 0.1, 0.8
 PINS = "expanding pins, drawn from behind, in its"
-NOT_FIXED = "NO HOLE TAKES A SCREW: say what holds the part to it, such as a clamp"
+NOT_FIXED = "NO HOLE FOR SCREWS: say what holds the part to it, such as a clamp"
 POTTED = "NO STRAIGHT END TO CLAMP: give jaws its form, or cast it into the block with polyurethane"
 # Thickness of a collar's or block's walls round an end: a share of its width, within [m], and where
 # there is no room for that, as thick as jaws with screws may be, and as a cap that is drilled.
