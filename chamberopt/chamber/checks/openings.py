@@ -69,6 +69,11 @@ class Opening(NamedTuple):
     # Of the box round the part in the first PLATE outside, if that is wider than the opening [m].
     wider: tuple[float, float] | None = None
 
+    @property
+    def is_end(self) -> bool:
+        """Whether its wall ends on the part there, so that nothing is cut."""
+        return self.form == "edge" or min(self.size) < EDGE
+
 
 def part_is_ceiling(chamber: Chamber) -> bool:
     """Return whether the part closes the room at its highest place, which has no other ceiling."""

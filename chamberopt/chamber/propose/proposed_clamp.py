@@ -136,9 +136,9 @@ def _clamp(made: Proposal) -> Clamp:
 
     It is what `outside_clamp` finds, or else surfaces by name.
     """
-    outside = free_outside(made.chamber)
     if (found := outside_clamp(made.chamber)).text:
         return found
+    outside = free_outside(made.chamber)
     known = [
         (one, np.where(rows_of(made.design, one.keys), outside, 0.0))
         for one in named_or_all(made.known)

@@ -117,13 +117,8 @@ def walls_end_at(openings: Sequence[Opening]) -> float | None:
 
     There the room is as high as the walls, and the part begins.
     """
-    ends = [one for one in openings if one.wall != CEILING and _is_end(one)]
+    ends = [one for one in openings if one.wall != CEILING and one.is_end]
     return min((one.place[2] - 0.5 * one.size[1] for one in ends), default=None)
-
-
-def _is_end(one: Opening) -> bool:
-    """Return whether a wall ends on the part there, so that nothing is cut."""
-    return one.form == "edge" or min(one.size) < EDGE
 
 
 def lid_in_words(built: AsBuilt) -> str:
@@ -147,7 +142,7 @@ def opening_in_words(one: Opening, clear: float = 0.0) -> str:
         clear: clearance round the part [m]. Along the part's section it is told beside the outline.
     """
     wall, wider = _wall_of(one), 0.0 if one.form == "other" else 2.0 * clear
-    if _is_end(one):
+    if one.is_end:
         return f"{_side(max(one.size))} mm of {wall}, which ends on the part,"
     if one.form == "round":
         return f"round, Ø {_side(0.5 * sum(one.size) + wider)} mm, in {wall}, its middle"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.checks.openings import EDGE, axes_along, find_openings
+from chamberopt.chamber.checks.openings import axes_along, find_openings
 from chamberopt.design.shape_surface import TAG_PART
 from chamberopt.pictures.drawing.cuts import SAME
 from chamberopt.pictures.drawing.openings import round_of
@@ -36,8 +36,7 @@ def centres(chamber: Chamber) -> list[Centre]:
         found += [*_of_holder(holder)]
     for one in find_openings(chamber):
         axis = int(np.abs(one.way).argmax())
-        is_edge = one.form == "edge" or min(one.size) < EDGE
-        if not is_edge and abs(one.way[axis]) > SQUARE:
+        if not one.is_end and abs(one.way[axis]) > SQUARE:
             x, y, z = (1e3 * place for place in _middle(one))
             found.append(Centre(axis, 1 if one.way[axis] > 0.0 else -1, (x, y, z)))
     return found

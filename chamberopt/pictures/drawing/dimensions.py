@@ -99,11 +99,21 @@ def with_limits(text: str, length: float, limits: Limits, *keys: str) -> str:
     for key in keys:
         value, low, high = limits.get(key, (math.inf, 0.0, 0.0))
         if abs(value - length) < SAME:
-            if low == high:
-                return reference(plain(low))
-            down, up = value - low, high - value
-            if abs(up - down) < 1e-9 * value:
-                return f"{text} ±{plain(up)}"
-            lower = f"{'−' if down > 0.0 else '+'}{plain(abs(down))}" if down else "0"
-            return f"{text} +{plain(up)}/{lower}"
+            return toleranced(text, value, low, high)
     return text
+
+
+def toleranced(text: str, value: float, low: float, high: float) -> str:
+    """Return the text of a dimension with its tolerance, or the size that follows from others.
+
+    Args:
+        value, low, high: the dimension, and what it may be [mm]; `low` and `high` are equal where
+            it follows.
+    """
+    if low == high:
+        return reference(plain(low))
+    down, up = value - low, high - value
+    if abs(up - down) < 1e-9 * value:
+        return f"{text} ±{plain(up)}"
+    lower = f"{'−' if down > 0.0 else '+'}{plain(abs(down))}" if down else "0"
+    return f"{text} +{plain(up)}/{lower}"

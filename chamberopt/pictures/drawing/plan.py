@@ -29,7 +29,6 @@ FREE = (-8.0, -8.0), (8.0, 2.0)
 # mm on paper from the room to the first dimension of a place, and to each further one, and how many
 # there are along each axis at most.
 PLACES, ROWS, MOST_PLACES = 5.3, 4.2, 2
-OFF_AXIS = 0.05  # mm: a section that is farther beside the axis has its place dimensioned
 TARGET = KINDS["target"].colour
 
 
@@ -54,7 +53,7 @@ def draw_plan(
     is_upright = False
     for name, plane in zip("AB", planes, strict=False):
         at_x, at_y = view.place([plane.at, plane.at])
-        beside = plain(round(abs(plane.at), 1)) if abs(plane.at) > OFF_AXIS else ""
+        beside = plain(round(abs(plane.at), 1)) if abs(plane.at) > OFF else ""
         if plane.right == 0:
             across_line(axes, (left - 3.0, at_y), (right + 3.0, at_y), name=name)
             ends = (left, min(y, at_y)), (left, max(y, at_y))

@@ -22,6 +22,7 @@ from chamberopt.pictures.drawing.dimensions import (
     across_line,
     dimension,
     reference,
+    toleranced,
     with_limits,
 )
 from chamberopt.pictures.drawing.view import LABEL, PART, View, draw_lines, fill, label
@@ -139,7 +140,7 @@ def _as_far(height: float, lowest: float, limits: Limits) -> str:
     value, *ends = limits.get("sonotrode_distance_mm", (lowest, lowest, lowest))
     low, high = (height + end - value for end in ends)
     shown = plain(round(height, 1))
-    return with_limits(shown, height, {"": (height, low, high)}, "") if high > low else shown
+    return toleranced(shown, height, low, high) if high > low else shown
 
 
 def _draw_centres(
