@@ -6,7 +6,7 @@ common, such as a chamber, once to each worker and not with every task.
 
 import os
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
 from typing import Any, Literal, ParamSpec, TypeVar
 
 from chamberopt.common.errors import InputError
@@ -20,6 +20,7 @@ WorkerKind = Literal["threads", "processes"]
 # and tallies), so seven threads keep the lock busy. Processes share no lock, but each process takes
 # some 2 s of CPU time to import modules and load compiled code.
 MAX_THREADS = 8
+LOOK_S = 0.5  # between looks at what a task has done
 
 
 def core_count() -> int:
@@ -87,6 +88,21 @@ def share(executor: Executor, value: T) -> T:
     share_with_workers = getattr(executor, "share", None)
     shared: T = value if share_with_workers is None else share_with_workers(value)
     return shared
+
+
+def result_of(future: Future[T], tell: Callable[[], None] | None = None) -> T:
+    """Wait for a task, and return its value. Ctrl-C ends the wait within LOOK_S seconds.
+
+    If the operating system gives Ctrl-C to another thread, it wakes nobody who waits without end.
+
+    Args:
+        tell: called every LOOK_S seconds meanwhile.
+    """
+    while not future.done():
+        wait([future], LOOK_S)
+        if tell:
+            tell()
+    return future.result()
 
 
 class ThreadExecutor(ThreadPoolExecutor):

@@ -6,7 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,6 +16,7 @@ import numpy as np
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError, WorkerLostError
 from chamberopt.common.estimate import Estimate, estimate, paired_difference
+from chamberopt.common.executor import result_of
 from chamberopt.common.files import write_text
 from chamberopt.common.number_text import rounded
 from chamberopt.common.progress import Progress
@@ -273,11 +274,8 @@ def run_search(
 
 
 def _outcome(candidate: Candidate, evaluation: Future[Outcome]) -> Outcome:
-    # A signal that another thread was given wakes nobody who waits without end.
-    while not evaluation.done():
-        wait([evaluation], timeout=0.2)
     try:
-        return evaluation.result()
+        return result_of(evaluation)
     except WorkerLostError as error:
         if candidate.stage == "sweep":  # a row with this reason
             return InputError(str(error))

@@ -28,7 +28,7 @@ import numpy as np
 
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
-from chamberopt.common.executor import SerialExecutor, core_count
+from chamberopt.common.executor import SerialExecutor, core_count, result_of
 from chamberopt.common.number_text import plain
 from chamberopt.common.progress import Progress, step
 from chamberopt.coverage.field.memory import OF_POINT, PROCESS, evaluation_bytes, how_many_fit
@@ -160,7 +160,7 @@ def run_convergence_study(
         found = [executor.submit(timed_figures, one, [range(one.started)]) for _, one in others]
         runs = []
         for (key, one), future in zip(others, found, strict=True):
-            (figures,), seconds, cpu_s = future.result()
+            (figures,), seconds, cpu_s = result_of(future)
             runs.append(one.run(key, figures, seconds, whole))
             study.spent += cpu_s
     each = runs[-1].cpu.value + of_figures  # the last run is of the design as it is
@@ -306,7 +306,7 @@ class _Study:
 
         def take() -> None:
             one, future = waiting.popleft()
-            one.done.append(future.result())
+            one.done.append(result_of(future))
             self.spent += one.done[-1].cpu_s
             progress(min(round(self.spent), total), total, None)
 

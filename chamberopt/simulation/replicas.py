@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, wait
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
@@ -17,7 +17,7 @@ from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.replica_seed import replica_seed, step_seed
 from chamberopt.chamber.scene import build_scene
 from chamberopt.common.errors import WorkerLostError
-from chamberopt.common.executor import share
+from chamberopt.common.executor import result_of, share
 from chamberopt.coverage.part_impacts import Hits, hits_on_part, in_pose_of, join_hits
 from chamberopt.simulation.resting_balls import RestingBalls, find_resting_balls
 from chamberopt.simulation.settling import dented_halves
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 S = TypeVar("S")
 T = TypeVar("T")
-LOOK_S = 0.5  # between looks at how far replicas have come
 
 
 class ReplicaSetting(NamedTuple):
@@ -146,7 +145,7 @@ def run_in_order(
         numbers: numbers of the replicas.
         ahead: number of tasks that are started before their results are wanted. It bounds the
             memory that waiting results take.
-        tell: called about every LOOK_S seconds while a result is waited for.
+        tell: called about every half second while a result is waited for.
     """
     waiting: deque[tuple[int, Future[T]]] = deque()
     try:
@@ -165,11 +164,8 @@ def run_in_order(
 
 
 def _result(number: int, future: Future[T], tell: Callable[[], None] | None) -> T:
-    while tell and not future.done():
-        wait([future], LOOK_S)
-        tell()
     try:
-        return future.result()
+        return result_of(future, tell)
     except WorkerLostError as error:
         raise WorkerLostError(f"replica {number}: {error}") from None
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.errors import InputError
-from chamberopt.common.executor import local_executor, share
+from chamberopt.common.executor import local_executor, result_of, share
 from chamberopt.common.limits import limit_cpu_time
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def be_parent() -> None:
     with local_executor(2, "processes") as executor:
         shared = share(executor, np.zeros(1000))
         print(*executor.map(pid_with, [shared] * 2), flush=True)
-        executor.submit(square, 3, None, 60.0).result()
+        result_of(executor.submit(square, 3, None, 60.0))
 
 
 def pid_with(shared: np.ndarray) -> int:

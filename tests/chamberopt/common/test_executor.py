@@ -1,8 +1,11 @@
 """All kinds of workers give the same results; a task is repeated once if its worker dies."""
 
+import os
 import pickle
+import signal
 import sys
 import threading
+import time
 from collections import Counter
 from concurrent.futures import Executor
 from pathlib import Path
@@ -12,7 +15,13 @@ import pytest
 from chamberopt.chamber.replica_seed import replica_seed
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError, WorkerLostError
-from chamberopt.common.executor import SerialExecutor, local_executor, open_executor, share
+from chamberopt.common.executor import (
+    SerialExecutor,
+    local_executor,
+    open_executor,
+    result_of,
+    share,
+)
 from chamberopt.design import load
 from chamberopt.simulation.replicas import run_in_order
 from tests.helpers import worker_jobs
@@ -202,3 +211,24 @@ def test_an_error_cancels_the_tasks_that_wait() -> None:
     with pytest.raises(ZeroDivisionError):
         fail_while_it_runs()
     assert [future.cancelled() for future in futures] == [False, True]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs signals")
+def test_ctrl_c_ends_a_wait_also_where_another_thread_is_given_it() -> None:
+    ended = threading.Event()
+
+    def task() -> None:
+        time.sleep(0.1)
+        signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+        ended.wait(20)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with local_executor(1) as executor:
+            waiting = executor.submit(task)
+            with pytest.raises(KeyboardInterrupt):
+                result_of(waiting)
+            assert not waiting.done()
+            ended.set()
+    finally:
+        signal.signal(signal.SIGINT, before)
