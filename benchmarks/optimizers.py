@@ -218,7 +218,7 @@ def optuna_with(sampler: str, first_replicas: int = 0) -> Optimizer:
 
         def suggest(trial: Any) -> np.ndarray:
             point = np.empty(len(axes))
-            for k, (levels, ordered, _) in enumerate(axes):
+            for k, (levels, ordered, *_) in enumerate(axes):
                 if not levels:
                     point[k] = trial.suggest_float(f"x{k}", 0.0, 1.0)
                 elif ordered:
@@ -259,7 +259,7 @@ def egobox(record: Record) -> None:
         else egx.XSpec(egx.XType.INT, [0, levels - 1])
         if ordered
         else egx.XSpec(egx.XType.ENUM, [levels])
-        for levels, ordered, _ in axes
+        for levels, ordered, *_ in axes
     ]
     scale = np.array([max(1, axis.levels - 1) for axis in axes], dtype=float)
 

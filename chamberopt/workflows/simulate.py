@@ -173,13 +173,15 @@ def simulate_design(
         design = with_usual_tolerances(design)
     if settings.analytic:
         design.require_one_step("an exact cavity in place of the mesh")
+    is_checked = chamber is not None
     if chamber is None:
         with teller.step("building the chamber"):
             chamber = build_chamber(design)
             most = Effort.of(design.process.accuracy).most
             how_many_fit(1, evaluation_bytes(design, chamber, most), PROCESS)
-            warnings = teller.check(design, chamber)
     cavity = analytic_cavity(design, chamber) if settings.analytic else None
+    if not is_checked:
+        warnings = teller.check(design, chamber)
     design, advice = resolve_effects(design, chamber, executor, teller)
     if settings.ranges:
         variants(design)  # before the work begins
