@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -11,7 +10,7 @@ from chamberopt.chamber.checks.calibration import misfit_texts
 from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.number_text import percent
 from chamberopt.coverage.metrics import OBJECTIVES
-from chamberopt.documents.coverage import change
+from chamberopt.documents.coverage import change, is_bound
 from chamberopt.documents.document import AnswerLine
 from chamberopt.documents.ranges import range_answer
 from chamberopt.documents.wanted import intensity_lines, time_lines
@@ -55,7 +54,7 @@ def answer(result: Result, start: Result | None) -> str:
                 f"{only}Too few dents were simulated to tell how much of the target is covered "
                 f"after {plain(treatment_time)} s."
             )
-        if _is_bound(known := result.metrics["mean_coverage"]):
+        if is_bound(known := result.metrics["mean_coverage"]):
             return (
                 f"After {plain(treatment_time)} s {_least_covered(result)}, and too few dents were "
                 f"simulated to tell the mean, but that it is {known.in_words} (95 % intervals); "
@@ -106,19 +105,10 @@ def on_average(result: Result) -> str:
     mean = result.metrics["mean_coverage"]
     if mean.in_words == NOT_RESOLVED:
         return f"{full_coverage(result)}; its mean coverage is not resolved"
-    if _is_bound(mean):
+    if is_bound(mean):
         return f"{full_coverage(result)}; {_least_covered(result)}"
     text = metric_label("mean_coverage").format(mean)
     return f"{full_coverage(result)}; covered to {text} on average"
-
-
-def _is_bound(mean: Estimate) -> bool:
-    """Return whether the least covered places tell that a mean coverage is more than a number.
-
-    Too few dents tell it itself. Beside the coverage of those places, which is larger than that
-    number, the two would read as a contradiction.
-    """
-    return math.isinf(mean.half_width) and mean.in_words not in ("", NOT_RESOLVED)
 
 
 def _least_covered(result: Result) -> str:

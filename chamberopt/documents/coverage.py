@@ -5,11 +5,12 @@ Figures are the objective and the metrics, such as mean coverage.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from chamberopt.common.estimate import Estimate, independent_difference, paired_difference
+from chamberopt.common.estimate import NOT_RESOLVED, Estimate, independent_difference, paired_difference
 from chamberopt.common.number_text import counted, typeset
 from chamberopt.documents.document import (
     Beside,
@@ -62,6 +63,11 @@ class Figure:
     range_text: str = ""
 
     @property
+    def is_bound_mean(self) -> bool:
+        """Whether it is a mean coverage of which a bound alone is known."""
+        return self.name == "mean_coverage" and is_bound(self.result)
+
+    @property
     def range_with_unit(self) -> str:
         """The text of the range, with its unit if it ends in a number."""
         return with_its_unit(self.label, self.range_text)
@@ -82,7 +88,7 @@ def figures(result: Result, start: Result | None) -> list[Figure]:
         Figure(
             name,
             label,
-            after,
+            _bound_in_words(after) if name == "mean_coverage" else after,
             before,
             change(after, before, result, start) if start and before else None,
             range_beside(result, name, label),
@@ -131,10 +137,27 @@ def change(after: Estimate, before: Estimate, result: Result, start: Result) -> 
 def main_figures(shown: Sequence[Figure]) -> list[Figure]:
     """Return the objective and the main metrics, with the Almen intensity if it is known.
 
-    Where it is not, the peening strength takes its place.
+    Where it is not, the peening strength takes its place. A mean coverage with a bound alone is
+    left out.
     """
     names = main_names(shown[0].name, (one.name for one in shown))
-    return [one for one in shown if one.name in names]
+    return [
+        one for one in shown if one.name in names and (one is shown[0] or not one.is_bound_mean)
+    ]
+
+
+def _bound_in_words(mean: Estimate) -> Estimate:
+    """Return a mean coverage with words that tell why a bound alone is known of it, if it is so."""
+    return replace(mean, in_words=f"{mean.in_words}: too few dents") if is_bound(mean) else mean
+
+
+def is_bound(mean: Estimate) -> bool:
+    """Return whether the least covered places tell that a mean coverage is more than a number.
+
+    Too few dents tell it itself. Beside the coverage of those places, which is larger than that
+    number, the two would read as a contradiction.
+    """
+    return math.isinf(mean.half_width) and mean.in_words not in ("", NOT_RESOLVED)
 
 
 def tiles(shown: Sequence[Figure]) -> Tiles:

@@ -98,11 +98,17 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
 
 
 def expected_figures(result: Result) -> list[Figure]:
-    """Return the figures that the sheet shows: the objective first, then those of EXPECTED."""
+    """Return the figures that the sheet shows: the objective first, then those of EXPECTED.
+
+    A mean coverage with a bound alone is left out, as among the main figures.
+    """
     calibration, shown = result.design.calibration, figures(result, None)
     hidden = "strength_um" if calibration and calibration.has_strips else ""
     return [
-        row for row in shown if (row is shown[0] or row.name in EXPECTED) and row.name != hidden
+        row
+        for row in shown
+        if row is shown[0]
+        or (row.name in EXPECTED and row.name != hidden and not row.is_bound_mean)
     ]
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from chamberopt.common.estimate import Estimate
 from chamberopt.documents.answer import _ended_lines, answer, answer_lines, on_average
+from chamberopt.documents.coverage import figures, main_figures
 from chamberopt.documents.study import influence_sentences, influences, tried_sentence
 from chamberopt.documents.wording import Label, objective_label
 from chamberopt.results.records import (
@@ -227,12 +228,20 @@ def test_a_mean_that_is_but_bounded_is_told_by_the_least_covered_places() -> Non
         objective=Estimate(0.9, 0.1),
         metrics=metrics,
         design=SimpleNamespace(process=SimpleNamespace(treatment_time=420.0)),
-        record=SimpleNamespace(field=SimpleNamespace(reachable_share=1.0)),
+        record=SimpleNamespace(field=SimpleNamespace(reachable_share=1.0), ranges=None),
     )
     least = "95 % of the target's area is covered to 99.87 ± 0.10 % or more"
     assert answer(result, None).startswith(f"After 420 s {least}, and too few dents were simulated")
     assert "more than 94 %" in answer(result, None)
     assert on_average(result).endswith(f"; {least}")
+    shown = figures(result, None)
+    assert [one.name for one in shown] == ["uniform_coverage", *metrics]
+    assert shown[1].result.in_words == "more than 94 %: too few dents"
+    assert [one.name for one in main_figures(shown)] == [
+        "uniform_coverage",
+        "p05_coverage",
+        "time_to_98_s",
+    ]
 
 
 @pytest.mark.parametrize(("by", "time"), [("gain", 800.0), ("gain", 1300.0), ("budget", 800.0)])
