@@ -119,7 +119,7 @@ def save_sweep(folder: str | Path, sweep: SweepResult) -> list[str]:
     """
     folder = Path(folder)
     record = write_sweep(folder, sweep)
-    remarks = sweep_map(folder / "map.png", sweep)
+    remarks = sweep_map(folder / "map.png", sweep, objective_label(sweep.study.objective.goals[0]))
     write_result(folder, record)
     return remarks
 

@@ -96,7 +96,7 @@ def style_axes(axes: Axes, x_label: str = "", y_label: str = "") -> None:
 def name_choices(axis: Axis, texts: Sequence[str]) -> None:
     """Label an axis with texts, the first at 0, the next at 1. Without texts it stays as it is."""
     if texts:
-        axis.set_ticks(range(len(texts)), texts)
+        axis.set_ticks(range(len(texts)), [one.replace("_", " ") for one in texts])
 
 
 def value_range(estimates: Sequence[Estimate], most: float = math.inf) -> tuple[float, float]:
@@ -131,8 +131,3 @@ def literal(text: str) -> str:
     """
     text = text.replace("$", r"\$")
     return f" {text}" if text.startswith("_") else text
-
-
-def readable(name: str) -> str:
-    """Return the name of an objective as text for an axis, with blanks in place of `_`."""
-    return name.replace("_", " ")

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from chamberopt.peening.kirk_fit import KirkFit
     from chamberopt.peening.virtual_strip import VirtualStrip
 
+CAVEAT = "five points tell the intensity better than the saturation time"
 MULTIPLE_NAMES = "T/4", "T/2", "T", "2 T", "4 T"
 
 
@@ -78,5 +79,5 @@ def strip_picture(path: Path, strip: VirtualStrip) -> None:
     style_axes(axes, "peening time, s", f"{quantity}, {strip.unit}")
     axes.set_xlim(0.0, times[-1])
     axes.set_ylim(0.0, 1.12 * float((middle + np.where(np.isfinite(half), half, 0.0)).max()))
-    axes.legend(fontsize=SMALL, frameon=False, loc="lower right", title=f"trust {symbol}, not T")
+    axes.legend(fontsize=SMALL, frameon=False, loc="lower right", title=CAVEAT)
     save_picture(figure, path)

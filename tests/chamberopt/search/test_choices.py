@@ -98,7 +98,9 @@ def test_tables_charts_and_sentences_have_the_texts(searched: StudyResult, tmp_p
     assert (tmp_path / "convergence.png").stat().st_size > 10_000
     places = searched.start.parameters, searched.best.parameters
     panel = slices_figure(found.slices, *places, "no loss", "score").axes[0]
-    assert [text.get_text() for text in panel.get_xticklabels()] == list(material.texts)
+    assert [text.get_text() for text in panel.get_xticklabels()] == [
+        one.replace("_", " ") for one in material.texts
+    ]
 
 
 def test_the_report_has_the_texts(searched: StudyResult) -> None:
@@ -121,12 +123,12 @@ def test_a_grid_has_all_texts_and_its_map_names_them(tmp_path: Path) -> None:
     ]
     assert sweep.best is not None
     assert sweep.best.parameters == {"shot.material": "zirconia", "shot.mass_g": 10.0}
-    assert sweep_map(tmp_path / "map.png", sweep) == []
+    assert sweep_map(tmp_path / "map.png", sweep, Label("score")) == []
     one = study({"shot.material": VARY["shot.material"]})
     alone = sweep_in_folder(
         one, plan_sweep(one, 2, None), tmp_path / "one", SerialExecutor(), simulator=by_material
     )
-    sweep_map(tmp_path / "curve.png", alone)
+    sweep_map(tmp_path / "curve.png", alone, Label("score"))
 
 
 def test_texts_are_choices_of_a_model_in_the_order_of_the_file() -> None:

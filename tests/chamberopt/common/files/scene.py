@@ -57,7 +57,7 @@ def remember_all() -> None:
     os.fsync = lambda _: None  # the disk is slow, and no power cut is tested
     check.warnings = lambda *_: []
     save_run.convergence_picture = lambda path, *_: write_bytes(path, b"a picture")
-    save_run.sweep_map = lambda path, _: [write_bytes(path, b"a picture")][1:]
+    save_run.sweep_map = lambda path, *_: [write_bytes(path, b"a picture")][1:]
     # Worker processes would do all from the beginning.
     executor.local_executor = lambda *_: executor.ThreadExecutor(1)
     compile_all()
