@@ -18,6 +18,7 @@ import numpy as np
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
+from chamberopt.common.key_words import inner_first
 from chamberopt.design.flexure import NO_STRESS
 
 if TYPE_CHECKING:
@@ -261,11 +262,17 @@ def find_metric(name: str) -> Metric | None:
         return None
     of_target = metric.summary
     if step != surface:
-        summary = f"{of_target}, step {step} alone"
+        summary = f"{of_target}, step {step.replace('_', ' ')} alone"
     else:
         of_zone = of_target.replace("the target", f"zone {surface}")
         summary = of_zone if of_zone != of_target else f"{of_target}, zone {surface}"
     return replace(metric, name=name, summary=summary, required=False)
+
+
+def named(name: str) -> str:
+    """Return the name of a metric, or of a number of a design, in words."""
+    metric = find_metric(name)
+    return metric.summary if metric else inner_first(name)
 
 
 def is_number(name: str) -> bool:

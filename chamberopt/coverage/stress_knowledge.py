@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.common.estimate import CONFIDENCE, Estimate, normal_quantile
-from chamberopt.coverage.metrics import FULL_COVERAGE
+from chamberopt.coverage.metrics import FULL_COVERAGE, named
 from chamberopt.coverage.stress_law import OF_DENT, PeenedMetal, arc_height, eigenstrain_under_dents
 from chamberopt.coverage.stress_model import StressModel, measured_law
 from chamberopt.design.almen_strip import STRIP_STEEL, STRIP_TENSILE, STRIP_YIELD, STRIPS
@@ -173,7 +173,8 @@ def stress_notes(design: Design, metrics: Mapping[str, Estimate]) -> tuple[str, 
     told = {name: band for name, band in stress_bands(design).items()
             if name in metrics and not metrics[name].in_words}  # fmt: skip
     if told:
-        known = ", ".join(f"{name} by a factor of {band:.3g}" for name, band in told.items())
+        parts = (f"the {named(name)} by a factor of {band:.3g}" for name, band in told.items())
+        known = ", ".join(parts)
         notes.append(
             f"beyond its interval, the law may be wrong in {known}, more or less, in all designs "
             "with this metal and shot alike: their ratios are better known"

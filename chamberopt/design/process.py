@@ -161,6 +161,11 @@ class Step(FileTable):
                 yield Problem(f"shot.{key}", text)
 
     @property
+    def title(self) -> str:
+        """Its name as people read it."""
+        return self.name.replace("_", " ")
+
+    @property
     def changes(self) -> dict[str, Any]:
         """What the step changes in the design, by the name of the table."""
         tables = ((name, getattr(self, name)) for name in type(self).model_fields)

@@ -10,7 +10,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from chamberopt.common.estimate import NOT_RESOLVED, Estimate, independent_difference, paired_difference
+from chamberopt.common.estimate import (
+    NOT_RESOLVED,
+    Estimate,
+    independent_difference,
+    paired_difference,
+)
 from chamberopt.common.number_text import counted, typeset
 from chamberopt.documents.document import (
     Beside,

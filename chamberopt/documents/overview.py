@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.checks.check import notes
+from chamberopt.common.key_words import title_with_unit
 from chamberopt.documents.answer import answer, answer_lines
 from chamberopt.documents.comparison import summary
 from chamberopt.documents.coverage import figures, figures_table
 from chamberopt.documents.document import Block, Fold, Items, Section, Sentence, Table, values
 from chamberopt.documents.report import limits_of_intervals, notes_of
 from chamberopt.documents.sheet import amplitude_text, key_row
+from chamberopt.documents.study import limit_in_words
 from chamberopt.documents.terminal_lines import sweep_end
 from chamberopt.documents.wording import objective_label, plain
 from chamberopt.results.load import load_start
@@ -55,14 +57,14 @@ def study_overview(study: Study) -> Section:
     goals = " and ".join(objective_label(name).in_full for name in study.objective.goals)
     rows = [
         (
-            name,
+            title_with_unit(name),
             (", " if varied.texts else " to ").join(map(plain, varied.ends)),
             _start(study, name),
         )
         for name, varied in study.vary.items()
     ]
     limits = [
-        f"{name} {sign} {plain(value)}"
+        limit_in_words(name, sign, value)
         for name, limit in study.all_constraints.items()
         for sign, value in (("≥", limit.min), ("≤", limit.max))
         if value is not None

@@ -51,7 +51,7 @@ def range_lines(found: RangeResult | None) -> list[str]:
         f"{found.replicas} replicas at each end"
     ]
     known = (name for name in HEADLINES if name in found.figures)
-    lines += [f"{name}: {_narrowed(found.figures[name])}" for name in known]
+    lines += [f"{metric_label(name).text}: {_narrowed(found.figures[name])}" for name in known]
     return [*lines, *_left_out(found)]
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from chamberopt.chamber.checks.check import matters
 from chamberopt.chamber.propose.proposed_budget import OF_TIME, ROUGH
 from chamberopt.common.files import read_file
+from chamberopt.common.key_words import title_with_unit
 from chamberopt.common.number_text import estimate_text, typeset
 from chamberopt.documents.answer import answer, answer_lines
 from chamberopt.documents.coverage import coverage_section, figures, tiles
@@ -38,6 +39,7 @@ from chamberopt.documents.tolerances import tolerance_section
 from chamberopt.documents.wording import (
     keys_in_words,
     metric_label,
+    named_value,
     objective_label,
     plain,
     value_text,
@@ -289,9 +291,7 @@ def _effect_text(name: str, value: object) -> str:
     if name == "flexure" and isinstance(value, Mapping) and not value["on"]:
         return "off"
     if isinstance(value, Mapping):
-        return ", ".join(
-            f"{key} = {value_text(one, 6)}" for key, one in value.items() if one is not None
-        )
+        return ", ".join(named_value(key, one, 6) for key, one in value.items() if one is not None)
     if name == "rest" and value is None:
         return "on where a still surface faces up"
     if name == "flexure" and value is None:
@@ -344,7 +344,7 @@ def _design(result: Result, start: Result | None) -> Section:
     after = _design_values(result)
     before = _design_values(start) if start else after
     changed = [
-        (name, before.get(name, value_text(None)), value)
+        (title_with_unit(name), before.get(name, value_text(None)), value)
         for name, value in after.items()
         if before.get(name, value_text(None)) != value
     ]

@@ -120,7 +120,7 @@ def _constraints(result: Result) -> list[str]:
         tables = tomllib.loads(read_file(result.path(STUDY)).decode())
     of_study = [
         " and ".join(
-            _limit_in_words(name, "≥" if side == "min" else "≤", limit)
+            limit_in_words(name, "≥" if side == "min" else "≤", limit)
             for side, limit in limits.items()
         )
         for name, limits in tables.get("constraints", {}).items()
@@ -131,7 +131,7 @@ def _constraints(result: Result) -> list[str]:
     ]
 
 
-def _limit_in_words(name: str, sign: str, limit: float) -> str:
+def limit_in_words(name: str, sign: str, limit: float) -> str:
     """Return a limit of a metric, or of a number of the design, in the unit that is shown."""
     if "." in name:
         return f"{inner_first(name)} {sign} {plain(limit)} {unit_of(name)}".rstrip()
@@ -158,7 +158,7 @@ def front_section(study: StudyRecord) -> Section | None:
         )
         for number, point in enumerate(study.front, start=1)
     ]
-    head = ("", first, second, *study.front[0].parameters)
+    head = ("", first, second, *map(title_with_unit, study.front[0].parameters))
     return Section("Two objectives", [Sentence(text), Table("The Pareto front", head, rows)])
 
 

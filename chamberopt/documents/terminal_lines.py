@@ -11,6 +11,7 @@ from itertools import chain, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+from chamberopt.common.key_words import title_with_unit
 from chamberopt.common.number_text import counted, estimate_text
 from chamberopt.common.number_text import plain as ascii_number
 from chamberopt.documents.answer import answer, answer_lines
@@ -130,7 +131,7 @@ def _table(
 
     A last column has the ranges of the last design over what is not calibrated, if they are known.
     """
-    rows = [(name, *values) for name, values in parameters.items()]
+    rows = [(title_with_unit(name), *values) for name, values in parameters.items()]
     rows += [
         (one.label.with_unit, *map(one.label.number, filter(None, (one.start, one.result))))
         for one in main_figures(shown)

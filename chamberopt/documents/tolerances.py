@@ -16,7 +16,7 @@ from chamberopt.common.key_words import title_with_unit
 from chamberopt.common.number_text import estimate_text
 from chamberopt.common.number_text import plain as ascii_number
 from chamberopt.documents.document import Block, Chart, Items, Section, Sentence, Table
-from chamberopt.documents.wording import Label, metric_label, plain
+from chamberopt.documents.wording import Label, metric_label, named_value, plain
 from chamberopt.pictures.charts.tolerances import TornadoBar, TornadoPanel, tornado_figure
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def tolerance_sentences(found: ToleranceResult) -> Iterator[str]:
     """Yield sentences on the main figures over all tolerances, and on the worst corner."""
     yield from (f"Over the tolerances, {name}: {text}." for name, text in sheet_rows(found))
     if found.corner:
-        place = ", ".join(f"{name} = {plain(value)}" for name, value in found.corner.items())
+        place = ", ".join(named_value(name, value) for name, value in found.corner.items())
         yield f"Worst corner, for the {metric_label(found.worst_for).text}: {place}."
 
 

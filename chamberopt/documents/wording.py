@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from chamberopt.common import number_text
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
-from chamberopt.common.key_words import KEY, key_in_words
+from chamberopt.common.key_words import KEY, inner_first, key_in_words, unit_of
 from chamberopt.common.number_text import estimate_text
 from chamberopt.coverage.metrics import (
     OBJECTIVES,
@@ -149,6 +149,15 @@ def value_text(value: object, digits: int = 4) -> str:
             f"({text})" if isinstance(one, list | tuple) else text for one, text in texts
         )
     return json.dumps(value, ensure_ascii=False) if isinstance(value, dict) else str(value)
+
+
+def named_value(name: str, value: object, digits: int = 4) -> str:
+    """Return a number of a design and its value in words, with its unit.
+
+    >>> named_value("shot.mass_g", 3.6)
+    'mass of the shot 3.6 g'
+    """
+    return f"{inner_first(name)} {value_text(value, digits)} {unit_of(name)}".rstrip()
 
 
 def with_unit(value: float, unit: str = "") -> str:

@@ -24,6 +24,12 @@ if TYPE_CHECKING:
 
 
 SIGNS = {"min": "≥", "max": "≤"}
+WORDS = {
+    "coverage_min": "coverage",
+    "coverage_max": "coverage",
+    "exposure_max": "exposure",
+    "intensity_mmA": "Almen intensity",
+}
 SUM = (
     "The figures of the target are of all steps together: their dents are added up by place. In "
     "times to a coverage, the times of all steps are scaled alike. Below are the figures of the "
@@ -32,13 +38,10 @@ SUM = (
 
 
 def limit_text(limit: ZoneLimit) -> str:
-    """Return a limit of a zone as text, e.g. "coverage_min = 0.98".
-
-    For a limit with a least and a largest value, the text of the least is "intensity_mmA ≥ 0.1".
-    """
-    sides = dict(LIMITED[limit.key])
-    sign = "=" if len(sides) == 1 else SIGNS[sides[limit.metric.rpartition(".")[2]]]
-    return f"{limit.key} {sign} {limit.limit:g}"
+    """Return a limit of a zone as text, e.g. "coverage ≥ 98 %"."""
+    name = limit.metric.rpartition(".")[2]
+    sign, label = SIGNS[dict(LIMITED[limit.key])[name]], metric_label(name)
+    return f"{WORDS[limit.key]} {sign} {plain(label.factor * limit.limit)} {label.unit}".rstrip()
 
 
 def zone_lines(result: Result) -> list[AnswerLine]:
@@ -152,7 +155,7 @@ def step_lines(result: Result) -> list[AnswerLine]:
             for label in (metric_label(name),)
         ]
         time = plain(one.process.treatment_time)
-        text = f"Step {number}, {step.name}, {time} s, {changes_in_words(step)}; alone: "
+        text = f"Step {number}, {step.title}, {time} s, {changes_in_words(step)}; alone: "
         lines.append(AnswerLine("step", f"{text}{', '.join(figures[:2])}.", False))
     return lines
 
@@ -173,5 +176,5 @@ def steps_section(result: Result) -> Section | None:
         of_steps = [result.metrics.get(f"{STEPS}.{step.name}.{name}") for step in steps]
         if any(of_steps):
             rows.append((label.with_unit, *(label.number(one) if one else "–" for one in of_steps)))
-    table = Table("± 95 % intervals", ("", *(step.name for step in steps)), rows)
+    table = Table("± 95 % intervals", ("", *(step.title for step in steps)), rows)
     return Section("Steps", [Sentence(SUM), table])

@@ -26,7 +26,7 @@ from chamberopt.common.files import (
     remove_file,
     write_text,
 )
-from chamberopt.common.key_words import AIMS, inner_first, unit_of
+from chamberopt.common.key_words import AIMS
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.coverage.metrics import OBJECTIVES, metric_names, metric_problem
 from chamberopt.design.design import Design
@@ -39,7 +39,7 @@ from chamberopt.documents.proposal import matter_of
 from chamberopt.documents.report import answer_section, notes_section
 from chamberopt.documents.study import aim_in_words
 from chamberopt.documents.wanted import times_longer
-from chamberopt.documents.wording import metric_label, value_text
+from chamberopt.documents.wording import metric_label, named_value
 from chamberopt.geometry.faces import Border
 from chamberopt.page.answers import (
     packed,
@@ -144,8 +144,7 @@ def _differences(results: Sequence[Result]) -> list[str]:
 
 
 def _value_in_words(name: str, value: object) -> str:
-    text = CHOICES.get(str(value)) or value_text(value)
-    return f"{inner_first(name)} {text} {unit_of(name)}".rstrip()
+    return named_value(name, CHOICES.get(str(value)) or value)
 
 
 def _stale(result: Result, now: Design) -> str:

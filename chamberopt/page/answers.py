@@ -103,7 +103,7 @@ def step_texts(design: Design) -> list[str]:
     whole = sum(one.time_share for one in design.steps)
     times = (plain(one.process.treatment_time, 3) for one in design.in_steps.values())
     return [
-        f"{step.name}: {time} s, {percent(step.time_share / whole)} of the time"
+        f"{step.title}: {time} s, {percent(step.time_share / whole)} of the time"
         for step, time in zip(design.steps, times, strict=True)
     ]
 

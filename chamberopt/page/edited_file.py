@@ -450,7 +450,7 @@ def _words(design: Design, name: str) -> dict[str, str]:
     table = ACCURACY if name == FACETS else table
     group = inner_first(table)
     if steps[0] == "steps":
-        group = f"step {(design.steps or ())[int(steps[1])].name}"
+        group = f"step {(design.steps or ())[int(steps[1])].title}"
     return {
         "table": table,
         "group": group[0].upper() + group[1:],

@@ -303,6 +303,9 @@ def _ratios(
     return estimates
 
 
+LEAST = METRICS["p05_coverage"].summary
+
+
 def reach_notes(reach: Reach, surface: str = TARGET) -> tuple[str, ...]:
     """Return a note on the highest coverage of a surface that balls do not reach everywhere.
 
@@ -312,16 +315,16 @@ def reach_notes(reach: Reach, surface: str = TARGET) -> tuple[str, ...]:
     if reachable > 1.0 - MIN_MISSED_SHARE:
         return ()
     highest = highest_uniform_coverage(reachable)
-    uniform = f" or a uniform_coverage above {highest:.2f}" if surface == TARGET else ""
-    bare = ", and its p05_coverage is 0" if beyond <= -CERTAIN else ""
+    uniform = f" or a uniform coverage above {highest:.2f}" if surface == TARGET else ""
+    bare = f", and the {LEAST} is 0" if beyond <= -CERTAIN else ""
     if abs(beyond) < CERTAIN:
         bare = (
-            f"; whether its p05_coverage is 0 is not resolved, as the share in reach is known to "
+            f"; whether the {LEAST} is 0 is not resolved, as the share in reach is known to "
             f"± {shared_half_width([reach.error]):.1%} only: raise process.accuracy.points"
         )
     return (
         f"{1.0 - reachable:.1%} of {surface} is out of reach of the balls and counts as bare: no "
-        f"chamber with so much of it has a mean_coverage above {reachable:.2f}{uniform}{bare}",
+        f"chamber with so much of it has a mean coverage above {reachable:.2f}{uniform}{bare}",
     )
 
 

@@ -209,7 +209,7 @@ class _Run:
                 *trapped_notes([one.trapped for one in own], design),
                 *resting_notes([one.resting for one in own if one.resting], len(own)),
             )
-            notes += [f"step {name}: {note}" if name else note for note in said]
+            notes += [f"step {name.replace('_', ' ')}: {note}" if name else note for note in said]
         return max(found, key=lambda shares: shares.get("rattling_impacts", 0.0)), tuple(notes)
 
     def look_after_more(self, progress: Progress | None) -> Evaluation:

@@ -10,7 +10,7 @@ from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import NOT_RESOLVED, Estimate, student_quantile
 from chamberopt.common.toml_errors import Problem
-from chamberopt.coverage.metrics import find_metric, metric_names, metric_problem
+from chamberopt.coverage.metrics import find_metric, metric_names, metric_problem, named
 from chamberopt.design.design import Design
 from chamberopt.design.table_base import FileTable
 from chamberopt.design.zones import LIMITED, Zone
@@ -149,7 +149,7 @@ def describe_violations(name: str, figure: Estimate, limits: Limits) -> list[str
     if figure.in_words == NOT_RESOLVED:
         return []
     violated = (text for _, excess, text in _excesses(figure, limits) if excess > 0.0)
-    return [f"{name} {figure.value:.4g} {text}" for text in violated]
+    return [f"{named(name)} {figure.value:.4g} {text}" for text in violated]
 
 
 def assess_feasibility(
@@ -167,8 +167,8 @@ def assess_feasibility(
                 continue
             is_violated = excess > figure.half_width
             feasibility = INFEASIBLE if is_violated or feasibility == INFEASIBLE else NOT_KNOWN
-            value = f"{name} {figure.in_words or f'{figure.value:.4g} ± {figure.half_width:.2g}'}"
-            text = f"{value} {'' if is_violated else 'may be '}{comparison}"
+            value = figure.in_words or f"{figure.value:.4g} ± {figure.half_width:.2g}"
+            text = f"{named(name)} {value} {'' if is_violated else 'may be '}{comparison}"
             violations.append(Violation(name, text))
     return feasibility, tuple(violations)
 

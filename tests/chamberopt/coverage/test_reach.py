@@ -65,7 +65,7 @@ def test_never_is_said_where_too_much_is_surely_out_of_reach() -> None:
     assert reach.beyond(0.95) < -CERTAIN
     assert metrics["p05_coverage"].value == metrics["p05_coverage"].half_width == 0.0
     assert metrics["time_to_98_s"].in_words == "never"
-    assert notes[0].endswith("and its p05_coverage is 0")
+    assert notes[0].endswith("and the coverage that 95 % of the area exceeds is 0")
 
 
 def dents(level: float) -> DentSums:

@@ -290,7 +290,7 @@ def test_a_metal_that_hardens_strongly_gets_no_depth() -> None:
     """Tensile over yield strength of 316L is 2, of a quenched steel 1.1."""
     plain = plate_design()
     assert len(stress_notes(plain, TOLD)) == 1
-    assert "compression_depth_um by a factor of 1.6" in stress_notes(plain, TOLD)[0]
+    assert "depth of compression in a thick part by a factor of 1.6" in stress_notes(plain, TOLD)[0]
     assert not plain.materials.part.hardens_strongly
     hard = plain.changed({"materials.part.tensile_MPa": 1000.0})
     both = hard.changed({"materials.part.yield_MPa": 900.0})
@@ -299,8 +299,8 @@ def test_a_metal_that_hardens_strongly_gets_no_depth() -> None:
     soft = hard.changed({"materials.part.yield_MPa": 290.0})
     assert soft.materials.part.hardens_strongly
     assert "cannot be estimated" in stress_notes(soft, TOLD)[1]
-    assert "surface_stress_MPa by a factor of 1.9" in stress_notes(DESIGN, TOLD)[0]
+    assert "residual stress at the surface by a factor of 1.9" in stress_notes(DESIGN, TOLD)[0]
     assert len(stress_notes(DESIGN, TOLD)) == 1
     thin = {**TOLD, "surface_stress_MPa": Estimate(-300.0, 1.0).not_known("plate too thin")}
-    assert "surface_stress_MPa" not in stress_notes(DESIGN, thin)[0]
-    assert "compression_depth_um" in stress_notes(DESIGN, thin)[0]
+    assert "stress at the surface" not in stress_notes(DESIGN, thin)[0]
+    assert "depth of compression" in stress_notes(DESIGN, thin)[0]

@@ -58,13 +58,13 @@ def test_the_record_has_the_steps(result: Result) -> None:
 
 def test_answer_report_and_sheet_have_a_line_for_each_step(result: Result) -> None:
     lines = [one.text for one in answer_lines(result) if one.about == "step"]
-    assert lines[0].startswith("Step 1, first_side, 5 s, as the design; alone: mean coverage of ")
+    assert lines[0].startswith("Step 1, first side, 5 s, as the design; alone: mean coverage of ")
     assert lines[1].startswith(TURNED)
     section = steps_section(result)
     assert section is not None
     _, table = section.content
     assert isinstance(table, Table)
-    assert table.head == ("", "first_side", "turned")
+    assert table.head == ("", "first side", "turned")
     assert table.rows[0] == ("time [s]", "5", "5")
     first_page = process_sheet(result, AsBuilt((50.0,))).sections[0].content
     rows = [row for one in first_page if isinstance(one, Table) for row in one.rows]

@@ -171,7 +171,7 @@ def test_constraints_that_are_not_certainly_met_are_in_the_answer() -> None:
     assert [one.text for one in lines] == [
         "It peens less hard than the start: the mean normal speed of the impacts goes from "
         "4.40 ± 0.10 m/s to 4.10 ± 0.10 m/s.",
-        "Zone root: intensity_mmA ≥ 0.1 is not known (0.12 ± 0.03 mmA).",
+        "Zone root: Almen intensity ≥ 0.1 mmA is not known (0.12 ± 0.03 mmA).",
         "Zone tip: no limits; mean coverage 90.0 ± 2.0 %.",
         "The start: constraints not met: shot_count 50 > max 30.",
         "The best chamber found: constraints not known: shot_count 33 may be > max 30.",

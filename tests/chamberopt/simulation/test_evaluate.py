@@ -96,13 +96,14 @@ def test_a_note_says_how_high_coverage_can_go_with_some_of_the_target_out_of_rea
     covered = np.repeat([1.0, 0.0], [80, 20])
     (note,) = reach_notes(Reach(0.8))
     assert "20.0% of the target is out of reach" in note
-    highest = f"mean_coverage above {covered.mean():.2f} or a uniform_coverage above "
+    highest = f"mean coverage above {covered.mean():.2f} or a uniform coverage above "
     assert f"{highest}{covered.mean() - covered.std():.2f}" in note
     assert reach_notes(Reach(0.999)) == ()
-    assert "uniform_coverage above 0.00" in reach_notes(Reach(0.4))[0]
+    assert "uniform coverage above 0.00" in reach_notes(Reach(0.4))[0]
     (of_zone,) = reach_notes(Reach(0.8), "zone root")
     assert of_zone.startswith("20.0% of zone root is out of reach")
-    assert of_zone.endswith("mean_coverage above 0.80, and its p05_coverage is 0")
+    bare = "and the coverage that 95 % of the area exceeds is 0"
+    assert of_zone.endswith(f"mean coverage above 0.80, {bare}")
 
 
 def test_dents_are_looked_at_once_however_replicas_come() -> None:

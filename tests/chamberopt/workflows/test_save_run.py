@@ -61,7 +61,7 @@ def test_zones_read_back_and_are_shown_from_the_folder_alone(tmp_path: Path) -> 
     judged = tables["Zones"][0].rows[0]
     assert judged[2].startswith("coverage that 95 % of the area exceeds: ")
     (line,) = [one for one in document.answer_lines if one.about == "zone"]
-    assert line.text.startswith("Zone left: coverage_min = 0.999 is not met (")
+    assert line.text.startswith("Zone left: coverage ≥ 99.9 % is not met (")
     assert line.warns
     assert not [row for row in tables["Coverage"][0].rows if "left." in row[0]]
     seen = OpenedResult(result_info(result))

@@ -40,7 +40,7 @@ def test_an_answer_keeps_its_limits_to_the_end_of_the_interval(
     )
     said, (why,) = assess_feasibility(constraints, {"mean_coverage": Estimate(0.3, 0.1)})
     assert said == "infeasible"
-    assert why == ("mean_coverage", "mean_coverage 0.3 ± 0.1 < min 0.5")
+    assert why == ("mean_coverage", "mean coverage of the target 0.3 ± 0.1 < min 0.5")
 
 
 def test_limits_that_no_candidate_can_meet_are_refused_before_any_work() -> None:
@@ -82,7 +82,7 @@ def test_the_limits_of_a_zone_are_constraints(tmp_path: Path) -> None:
     assert 3.5 < result.best.design.shot.mass_g <= 4.0
     assert result.best.feasibility == "feasible"
     reasons = [trial.reason for trial in result.trials if not trial.feasible]
-    assert any("face.p95_coverage" in reason and "> max 0.5" in reason for reason in reasons)
+    assert any("area exceeds, zone face" in reason and "> max 0.5" in reason for reason in reasons)
     with pytest.raises(ValueError, match="the zone limits it in the design already"):
         Study(design=design, vary=VARY, constraints={"face.p95_coverage": Limits(max=0.4)})
     with pytest.raises(ValueError, match=r"zones\.0\.coverage_max: what is asked of"):
@@ -97,7 +97,7 @@ def test_where_no_constraint_is_surely_kept_the_answer_says_so(tmp_path: Path) -
 
     result = run_bowl(tmp_path, simulator, constraints={"mean_coverage": Limits(min=0.5)})
     assert result.best.feasibility == "not known"
-    assert "mean_coverage 0.505 ± 0.13 may be < min 0.5" in result.warnings[0]
+    assert "mean coverage of the target 0.505 ± 0.13 may be < min 0.5" in result.warnings[0]
 
 
 def test_a_figure_that_is_not_resolved_is_not_known_to_violate_anything() -> None:
