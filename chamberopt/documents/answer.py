@@ -18,6 +18,7 @@ from chamberopt.documents.wording import Label, metric_label, objective_label, p
 from chamberopt.documents.zones import step_lines, zone_lines
 from chamberopt.results.load import load_result, load_start
 from chamberopt.search.study.constraints import MET
+from chamberopt.simulation.effort import Effort
 
 if TYPE_CHECKING:
     from chamberopt.results.load import Result
@@ -98,6 +99,14 @@ def answer(result: Result, start: Result | None) -> str:
         f"No chamber was found that is certainly better: the {named} goes {values}, but the "
         f"change of {gained} is within the noise {intervals}."
     )
+
+
+def stopped_text(result: Result) -> str:
+    """Return a sentence on a simulation that its user stopped; "" for others."""
+    if result.record.stopped_by != "user":
+        return ""
+    done, most = result.record.replicas, Effort.of(result.design.process.accuracy).most
+    return f"Stopped after {done} of {most} replicas: its intervals are wider than those of all."
 
 
 def on_average(result: Result) -> str:

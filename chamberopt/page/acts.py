@@ -31,7 +31,7 @@ from chamberopt.common.toml_fields import read_toml
 from chamberopt.coverage.metrics import OBJECTIVES, metric_names, metric_problem
 from chamberopt.design.design import Design
 from chamberopt.design.load import is_study
-from chamberopt.documents.answer import on_average
+from chamberopt.documents.answer import on_average, stopped_text
 from chamberopt.documents.comparison import after_shorter_time
 from chamberopt.documents.document import Fold, Section, Sentence
 from chamberopt.documents.overview import comparison_overview
@@ -90,6 +90,7 @@ def list_results(folder: Path, now: Design) -> list[dict[str, object]]:
 
     Each has a line on its coverage, and on the numbers of its design by which the results differ.
     The line `stale` says in what its design was another than the one on the page; "" for nothing.
+    The line `stopped` says after how many replicas a user stopped it; "" for others.
 
     Args:
         now: the design on the page.
@@ -104,6 +105,7 @@ def list_results(folder: Path, now: Design) -> list[dict[str, object]]:
             results[row["folder"]] = result
             row["text"] = on_average(result)
             row["stale"] = _stale(result, now)
+            row["stopped"] = stopped_text(result)
         except InputError as error:
             unfinished = row["is_study"] and not is_finished(where)
             row["text"] = "a study that has not finished" if unfinished else str(error)

@@ -19,6 +19,7 @@ async function refresh(tick = ticked) {
   list.replaceChildren(...rows.map((row) => {
     const box = element("input", { type: "checkbox", value: row.folder, disabled: Boolean(row.unusable), checked: kept.includes(row.folder) });
     const item = element("li", {}, element("label", {}, box, ` ${row.folder}`), element("small", {}, ...onPage(row.words)));
+    if (row.stopped) item.append(element("small", { className: "warning", textContent: row.stopped }));
     if (row.stale) item.append(element("small", { className: "warning", textContent: `${row.stale} Its report and process sheet have what it had.` }));
     if (row.is_study) item.append(button("see its candidates", () => followStudy(row.folder)), " ");
     for (const [paper, file, name] of row.unusable ? [] : FILES)

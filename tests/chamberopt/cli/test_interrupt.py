@@ -14,6 +14,7 @@ import pytest
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.executor import SerialExecutor
+from chamberopt.documents.answer import stopped_text
 from chamberopt.results.load import load_result
 from chamberopt.simulation.evaluate import evaluate
 from tests.hunt.base import write_base
@@ -120,6 +121,7 @@ def test_ctrl_c_keeps_the_replicas_that_have_ended(place: Path) -> None:
     assert result.record.stopped_by == "user"
     assert f"stopped by the user after {replicas} of 999 replicas" in result.record.notes[0]
     assert "98 %" in told
+    assert stopped_text(result).startswith(f"Stopped after {replicas} of 999 replicas: ")
     again = result.design.changed({"process.accuracy.replicas": replicas})
     figures = evaluate(again, build_chamber(again), SerialExecutor()).metrics
     name = "mean_coverage"

@@ -278,6 +278,31 @@ def test_a_click_measures_what_is_round(opened: Page) -> None:
     assert found[:, 1].tolist() == [0, 0, 0, 0, 0, 0, 1]
 
 
+def test_a_click_on_a_fillet_that_goes_round_measures_its_radius(opened: Page) -> None:
+    """Round a shaft of 12 mm goes a quarter of a torus of 2.5 mm: 9 facets by 72, none a neat one."""
+    of = """() => {
+      const points = [], index = [], ways = 72, bends = 9;
+      for (let k = 0; k < ways; k++) for (let i = 0; i <= bends; i++) {
+        const shift = i % bends ? 0.3 * Math.sin(17 * k + 5 * i) : 0;
+        const turn = 2 * Math.PI * (k + shift) / ways, bend = Math.PI / 2 * (i - shift) / bends;
+        const away = 8.5 - 2.5 * Math.cos(bend);
+        points.push(away * Math.cos(turn), away * Math.sin(turn), 2.5 - 2.5 * Math.sin(bend));
+        if (i === bends) continue;
+        const [a, b] = [k, (k + 1) % ways].map((one) => (bends + 1) * one + i);
+        index.push(a, b, b + 1, a, b + 1, a + 1);
+      }
+      const mesh = new THREE.Mesh();
+      Object.assign(mesh.userData, { points, index });
+      return [60, 69, 78].map((k) => {
+        const ends = [0, 1, 2].map((i) => Round.corner(mesh, index[3 * k + i]));
+        const middle = ends[0].add(ends[1]).add(ends[2]).divideScalar(3);
+        const found = Round.of(mesh, k, middle);
+        return found && Measure.across(found);
+      });
+    }"""
+    assert opened.page.evaluate(of) == ["R about 2.5 mm"] * 3
+
+
 def test_the_legend_hides_a_kind_and_the_view_turns_to_an_axis(opened: Page) -> None:
     page, wall = opened.page, opened.page.locator("#legend").get_by_role("button", name="wall")
     way = [0.0, 0.0, 0.0]

@@ -39,9 +39,15 @@ class Measure {
     const first = this.#first?.view === view ? this.#first : null;
     this.#first = first ? null : { view, ...hit };
     const met = Measure.#met(view, event), round = met?.name ? Round.of(view.get(met.name), met.triangle, met.place) : null;
-    const across = !round ? [] : [round.isArc ? `R ${Measure.number(0.5 * round.diameter)} mm` : `⌀ ${Measure.number(round.diameter)} mm`], lines = first ? [...Measure.words(first, hit), ...across] : across;
+    const across = round ? [Measure.across(round)] : [], lines = first ? [...Measure.words(first, hit), ...across] : across;
     this.#show(view, first ? [first.place, hit.place] : [hit.place], lines, round);
     this.tell(first ? lines.join("; ") : [...across, `from ${hit.on} at ${Measure.at(hit.place)}: click the other point`].join("; "));
+  }
+
+  // The radius of less than half a circle, else its diameter.
+  static across({ diameter, isArc, isRough }) {
+    const size = isArc ? 0.5 * diameter : diameter;
+    return `${isArc ? "R" : "⌀"} ${isRough ? `about ${Number(size.toPrecision(2))}` : Measure.number(size)} mm`;
   }
 
   #show(view, places, words, round) {

@@ -1,4 +1,4 @@
-// The circle of a bore, a shaft or a disc, found from the triangles of the surface that a click meets.
+// The circle of a bore, a shaft, a disc or a fillet that goes round, found from the triangles of the surface that a click meets.
 "use strict";
 class Round {
   static FLAT = Math.cos(0.5 * Math.PI / 180); // between triangles of one facet
@@ -10,9 +10,12 @@ class Round {
   static CORNERS = 12; // least of a round border
   static OTHER = 0.005; // rad, between the normals of two facets
   static TRIED = 6; // facets beside the one that is met, each of which gives an axis
+  static WAYS = 60; // planes across a surface that bends along two ways, in one of which it bends most
+  static MOST = 400; // steps of the line in which a plane cuts a surface, to each side
 
-  // Circle round the axis of the round surface at a triangle of a mesh, or round border of the flat face there that is
-  // nearest to a place: { diameter, isArc: whether less than half of it is there, at(angle): a place on it }; null for neither.
+  // Circle round the axis of the round surface at a triangle of a mesh, circle along which a torus or ball bends most
+  // there, or round border of the flat face there that is nearest to a place: { diameter, isArc: whether less than half of it is there, isRough: whether it is known
+  // to two digits only, at(angle): a place on it }; null for neither.
   static of(mesh, triangle, place) {
     const { normals, beside } = Round.facets(mesh), own = place.clone().applyMatrix4(mesh.matrixWorld.clone().invert());
     const facet = (first) => Round.#flood(beside, [first], (k) => normals[k].dot(normals[first]) > Round.FLAT);
@@ -20,8 +23,9 @@ class Round {
     const next = [...new Set(flat.flatMap((k) => [0, 1, 2].map((c) => beside[3 * k + c])))]
       .filter((k) => k >= 0 && !inside.has(k) && normals[k].dot(normals[triangle]) > Round.SMOOTH);
     const round = next.slice(0, Round.TRIED).map((k) => Round.#surface(mesh, [...flat, ...facet(k)], normals[triangle].clone().cross(normals[k]), own));
-    const found = round.reduce((best, one) => one && one.count > (best?.count ?? 0) ? one : best, null) ?? Round.#border(mesh, flat, normals[triangle], own);
-    return found && { diameter: 2 * found.radius, isArc: Boolean(found.isArc), at: (angle) => found.at(angle).applyMatrix4(mesh.matrixWorld) };
+    const found = round.reduce((best, one) => one && one.count > (best?.count ?? 0) ? one : best, null)
+      ?? Round.#tube(mesh, triangle, normals[triangle], own) ?? Round.#border(mesh, flat, normals[triangle], own);
+    return found && { diameter: 2 * found.radius, isArc: Boolean(found.isArc), isRough: Boolean(found.isRough), at: (angle) => found.at(angle).applyMatrix4(mesh.matrixWorld) };
   }
 
   // Normal of each triangle of a mesh, and the triangle beside each of its sides, -1 at the border; found once.
@@ -69,6 +73,62 @@ class Round {
     const facets = turns.filter((turn, i) => !i || turn - turns[i - 1] > Round.OTHER).length;
     return 2 * Math.PI - gap < Round.SWEEP || facets < Round.FACETS ? null
       : { ...plane.on(circle, place.dot(axis)), count: all.length, isArc: gap > Math.PI };
+  }
+
+  // The circle of the cut in which a surface bends most at a place of a triangle: of a torus, round its tube.
+  static #tube(mesh, triangle, normal, place) {
+    const around = Round.#plane(normal).on({ x: 0, y: 0, radius: 1 }, 0);
+    let best = null;
+    for (let way = 0; way < Round.WAYS; way++) {
+      const axis = normal.clone().cross(around.at(way * Math.PI / Round.WAYS)).normalize(), plane = Round.#plane(axis), height = place.dot(axis);
+      const [before, after] = Round.#cut(mesh, triangle, axis, height).map((side) => side.map(plane.of));
+      const circle = Round.#along(before, after);
+      if (circle && circle.radius < (best?.radius ?? Infinity)) best = { ...plane.on(circle, height), isArc: circle.isArc, isRough: true };
+    }
+    return best;
+  }
+
+  // The points in which a plane cuts the sides of triangles, from one triangle to both of its sides as far as it goes on smoothly.
+  static #cut(mesh, triangle, axis, height) {
+    const { normals, beside } = Round.facets(mesh), { index } = mesh.userData;
+    const met = (k, c) => {
+      const [a, b] = [c, (c + 1) % 3].map((i) => Round.corner(mesh, index[3 * k + i])), [from, to] = [a, b].map((one) => one.dot(axis) - height);
+      return (from < 0) === (to < 0) ? null : a.lerp(b, from / (from - to));
+    };
+    return [0, 1, 2].filter((c) => met(triangle, c)).map((side) => {
+      const points = [];
+      for (let k = triangle, c = side; points.length < Round.MOST;) {
+        points.push(met(k, c));
+        const next = beside[3 * k + c], back = [0, 1, 2].find((i) => beside[3 * next + i] === k);
+        if (next < 0 || next === triangle || back === undefined || normals[next].dot(normals[k]) < Round.SMOOTH) break;
+        c = [0, 1, 2].find((i) => i !== back && met(next, i));
+        if (c === undefined) break;
+        k = next;
+      }
+      return points;
+    });
+  }
+
+  // The circle on which a line lies as far as it can be followed to both sides; null for what turns too little.
+  static #along(before, after) {
+    if (!before?.length || !after?.length) return null;
+    const line = [...before.toReversed(), ...after], middle = before.length;
+    let low = Math.max(0, middle - 3), high = Math.min(line.length, middle + 3), circle = null;
+    const fits = (from, to) => {
+      const points = line.slice(from, to), found = points.length < 4 ? null : Round.#circle(points);
+      return found && Round.#lie(found, points) ? found : null;
+    };
+    if (!(circle = fits(low, high))) return null;
+    for (let grows = true; grows;) {
+      grows = false;
+      for (const [from, to] of [[low - 1, high], [low, high + 1]]) {
+        const more = from < 0 || to > line.length ? null : fits(from, to);
+        if (more) [low, high, circle, grows] = [from, to, more, true];
+      }
+    }
+    const turns = line.slice(low, high).map(([x, y]) => Math.atan2(y - circle.y, x - circle.x));
+    const turn = Math.abs(turns.slice(1).reduce((sum, one, i) => sum + Math.atan2(Math.sin(one - turns[i]), Math.cos(one - turns[i])), 0));
+    return turn < Round.SWEEP || high - low <= Round.FACETS ? null : { ...circle, isArc: turn < Math.PI };
   }
 
   // The border of a flat face that is nearest to a place, if it is round.
