@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from chamberopt.pictures.actors import SCATTER, add_edges, add_part, body_meanings, colour_meanings
 from chamberopt.pictures.camera import target_in_chamber
-from chamberopt.pictures.drawn_part import DrawnPart, colour_range
+from chamberopt.pictures.drawn_part import DrawnPart, beyond, colour_range
 from chamberopt.pictures.panels import choose_views, part_panels
 from chamberopt.pictures.picture_page import ColourBar, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess
@@ -72,11 +70,8 @@ def coverage_bar(parts: Sequence[DrawnPart], limits: tuple[float, float]) -> Col
     The label names the limits unless they are 0 and 100 %.
     """
     quantity = parts[0].quantity
-    shown = np.concatenate([part.target["shown"] for part in parts])
-    shown = shown[np.isfinite(shown)]
-    low, high = bool((shown < limits[0]).any()), bool((shown > limits[1]).any())
-    beyond = {(True, True): "both", (True, False): "min", (False, True): "max"}
+    ends = {(True, True): "both", (True, False): "min", (False, True): "max"}
     label = quantity.title
     if quantity.unit == "%" and limits != (0.0, 100.0):
         label += f", scale from {limits[0]:g} to {limits[1]:g} %"
-    return ColourBar(label, quantity.colours, limits, beyond.get((low, high), "neither"))
+    return ColourBar(label, quantity.colours, limits, ends.get(beyond(parts, limits), "neither"))

@@ -202,6 +202,13 @@ def colour_range(parts: Sequence[DrawnPart]) -> tuple[float, float]:
     return low, min(100.0, max(low + step, step * np.ceil(high / step)))
 
 
+def beyond(parts: Sequence[DrawnPart], limits: tuple[float, float]) -> tuple[bool, bool]:
+    """Return whether values that parts show are below and above the limits of the colours."""
+    shown = np.concatenate([part.target["shown"] for part in parts])
+    shown = shown[np.isfinite(shown)]
+    return bool((shown < limits[0]).any()), bool((shown > limits[1]).any())
+
+
 def _round_range(low: float, high: float) -> tuple[float, float]:
     """Return limits widened to round numbers. The lower limit becomes 0 if it is near 0."""
     span = high - low if high > low else max(abs(high), 1e-12)

@@ -108,12 +108,19 @@ def show_title(plotter: Any, title: str, lines: Sequence[str], size: Size) -> No
 
 
 def show_colour_bar(
-    plotter: Any, quantity: Quantity, limits: tuple[float, float], actor: Any, name: str, size: Size
+    plotter: Any,
+    quantity: Quantity,
+    limits: tuple[float, float],
+    beyond: tuple[bool, bool],
+    actor: Any,
+    name: str,
+    size: Size,
 ) -> None:
     """Draw the colour bar of a surface at the right edge of the view, with its title above it.
 
     Args:
         limits: values at the ends of the bar.
+        beyond: whether values are below and above the limits.
         actor: actor of the surface, whose mapper has the colours.
         name: title of the bar.
         size: width and height of the view [pixels].
@@ -129,8 +136,9 @@ def show_colour_bar(
     bar.DrawAboveRangeSwatchOff()
     bar.DrawNanAnnotationOff()
     lines = textwrap.wrap(quantity.title, 14)
-    if quantity.unit == "%" and limits != (0.0, 100.0):
-        lines.append(f"{limits[0]:g} to {limits[1]:g} %")
+    if any(beyond) or (quantity.unit == "%" and limits != (0.0, 100.0)):
+        low, high = (mark * is_beyond for mark, is_beyond in zip(("≤ ", "≥ "), beyond, strict=True))
+        lines.append(f"{low}{limits[0]:g} to {high}{limits[1]:g} {quantity.unit}".rstrip())
     title = "\n".join(lines)
     place = (size[0] - EDGE, 0.885 * size[1])
     text = _add_text(plotter, "bar title", title, place, fonts(size)[1])

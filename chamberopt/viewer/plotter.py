@@ -32,6 +32,7 @@ from chamberopt.pictures.camera import (
     target_in_chamber,
 )
 from chamberopt.pictures.charts.colours import PART_GREY, zone_colour
+from chamberopt.pictures.drawn_part import beyond
 from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.results.vtp_files import pyvista, size_text
 from chamberopt.viewer.opened_result import (
@@ -244,7 +245,8 @@ class ResultPlotter:
         quantity = QUANTITIES[state.quantity]
         if quantity.name != "zones":
             bar = part_actors[0], _bar_name(number)
-            overlay.show_colour_bar(plotter, quantity, limits, *bar, size)
+            ends = beyond([result.part], limits)
+            overlay.show_colour_bar(plotter, quantity, limits, ends, *bar, size)
         share = BESIDE_SLIDER if self.menu else BESIDE_CHART if lines else LEGEND
         wide = int(share * size[0])
         remarks = _remarks(result, state, pale)

@@ -70,14 +70,17 @@ function showParts({ quantities, scenes, scales, kinds }) {
     find("times").hidden = !moves();
   }
 
-  // The scale of colours with its ends and three values between, and what it shows.
-  function showBar(bar, low, high) {
+  // The scale of colours with its ends and three values between, and what it shows. An end beyond which there are values
+  // is an arrow.
+  function showBar(bar, low, high, known) {
     const scale = document.createElement("i"), ticks = document.createElement("span"), title = document.createElement("b");
     scale.style.background = `linear-gradient(to top, ${scales[chosen().colours].join(", ")})`;
     title.textContent = chosen().title;
+    const within = 1e-6 * (high - low), ends = { 0: known.some((x) => x < low - within) ? "≤ " : "", 1: known.some((x) => x > high + within) ? "≥ " : "" };
+    scale.className = [ends[0] && "below", ends[1] && "above"].filter(Boolean).join(" ");
     for (const share of [1, 0.75, 0.5, 0.25, 0]) {
       const tick = document.createElement("em");
-      tick.textContent = number(low + share * (high - low));
+      tick.textContent = `${ends[share] ?? ""}${number(low + share * (high - low))}`;
       ticks.append(tick);
     }
     bar.replaceChildren(scale, ticks, title);
@@ -115,7 +118,7 @@ function showParts({ quantities, scenes, scales, kinds }) {
       all.forEach((one, i) => {
         const share = one.map((x) => Number.isFinite(x) ? Math.min(Math.max((x - low) / (high - low), 0), 1) : 0);
         views[i].paint("part", share, scales[chosen().colours]);
-        showBar(bars[i], low, high);
+        showBar(bars[i], low, high, one);
       });
       document.body.dataset.drawn = "yes";
     });

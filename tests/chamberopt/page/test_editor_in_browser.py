@@ -279,7 +279,7 @@ def test_a_click_measures_what_is_round(opened: Page) -> None:
 
 
 def test_a_click_on_a_fillet_that_goes_round_measures_its_radius(opened: Page) -> None:
-    """Round a shaft of 12 mm goes a quarter of a torus of 2.5 mm: 9 facets by 72, none a neat one."""
+    """Round a shaft of 12 mm goes a quarter of a torus of 2.5 mm: 9 by 72 uneven facets."""
     of = """() => {
       const points = [], index = [], ways = 72, bends = 9;
       for (let k = 0; k < ways; k++) for (let i = 0; i <= bends; i++) {

@@ -107,7 +107,10 @@ def test_the_slider_shows_coverage_at_other_times(shown: OpenPage) -> None:
     slider, ticks = shown.page.locator("#time"), shown.page.locator("#part-0 .bar em")
     data = json.loads(shown.page.locator("#parts").text_content())
     ends = data["scenes"][0]["limits"]  # those of the picture beside the page
-    assert [float(one) for one in ticks.all_text_contents()][::4] == ends[::-1]
+    told = ticks.all_text_contents()[::4]
+    assert [float(one.lstrip("≤≥ ")) for one in told] == ends[::-1]
+    marked = shown.page.locator("#part-0 .bar i").get_attribute("class").split()
+    assert [("≥" in told[0]), ("≤" in told[1])] == [name in marked for name in ("above", "below")]
     slider.focus()
     slider.press("Home")
     expect(ticks.last).to_have_text("0")

@@ -419,11 +419,15 @@ class View3D {
     }
     const usual = TEXT_HEIGHT * this.element.clientHeight / (2 * halfOf(LENS));
     const height = Math.max(usual, TEXT_PX), scale = 2 * halfOf(this.camera.fov) * height / this.element.clientHeight;
+    const box = this.renderer.domElement.getBoundingClientRect();
     const texts = all.filter(({ userData, visible }) => userData.isText && visible).flatMap(({ children }) => children);
     for (const one of texts.sort((a, b) => b.renderOrder - a.renderOrder)) {
       one.scale.set(scale * one.scale.x / one.scale.y, scale, 1);
       const width = height * one.scale.x / one.scale.y, [x, y] = this.onScreen(one.position);
-      const left = x - one.center.x * width, top = y - (1 - one.center.y) * height;
+      const centre = one.userData.centre ??= one.center.x, isInside = x > box.left && x < box.right;
+      const left = isInside ? Math.max(box.left + 2, Math.min(x - centre * width, box.right - width - 2)) : x - centre * width;
+      one.center.x = (x - left) / width; // all of a text is in the window if what it names is
+      const top = y - (1 - one.center.y) * height;
       const isOver = taken.some(([l, t, w]) => left < l + w && l < left + width && top < t + height && t < top + height);
       if (isOver) one.layers.set(1);
       else if (one.layers.mask === 1) taken.push([left, top, width]);
