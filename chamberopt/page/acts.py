@@ -85,11 +85,12 @@ MOST_VALUES = 6  # by which results differ, in the line of each
 DEEPEST = 4  # levels of folders below the design's folder that are searched for results
 
 
-def list_results(folder: Path, now: Design) -> list[dict[str, object]]:
+def list_results(folder: Path, now: Design) -> list[dict[str, Any]]:
     """List all results and studies below a folder, the newest first.
 
     Each has a line on its coverage, and on the numbers of its design by which the results differ.
     The line `stale` says in what its design was another than the one on the page; "" for nothing.
+    `before` has these values as changes of the design on the page, as far as they are such.
     The line `stopped` says after how many replicas a user stopped it; "" for others.
 
     Args:
@@ -104,7 +105,8 @@ def list_results(folder: Path, now: Design) -> list[dict[str, object]]:
             result = load_result(where)
             results[row["folder"]] = result
             row["text"] = on_average(result)
-            row["stale"] = _stale(result, now)
+            before = values_before(result, now)
+            row["stale"], row["before"] = _stale(before), _as_changes(before)
             row["stopped"] = stopped_text(result)
         except InputError as error:
             unfinished = row["is_study"] and not is_finished(where)
@@ -149,9 +151,23 @@ def _value_in_words(name: str, value: object) -> str:
     return named_value(name, CHOICES.get(str(value)) or value)
 
 
-def _stale(result: Result, now: Design) -> str:
+def _as_changes(before: Mapping[str, object]) -> dict[str, object]:
+    """Return numbers and texts by dotted names as changes of a design, each item of a list alone.
+
+    There are none if any value is something else, or absent.
+    """
+    changes: dict[str, object] = {}
+    for name, value in before.items():
+        items = value if isinstance(value, list | tuple) else None
+        named = {name: value} if items is None else {f"{name}.{k}": x for k, x in enumerate(items)}
+        if not all(isinstance(one, int | float | str) for one in named.values()):
+            return {}
+        changes |= named
+    return changes
+
+
+def _stale(before: Mapping[str, object]) -> str:
     """Return a sentence on the numbers that a result was simulated with, if others are now."""
-    before = values_before(result, now)
     texts = [_value_in_words(*one) for one in before.items()][:MOST_VALUES]
     more = f" and {len(before) - MOST_VALUES} more" if len(before) > MOST_VALUES else ""
     return f"Not of the design as it is now. It had: {', '.join(texts)}{more}." if texts else ""
@@ -520,8 +536,14 @@ class Acts:
             )
 
     def results(self, asked: Any) -> list[dict[str, object]]:
-        now = self._file(asked).with_changes(asked["changes"])
-        return list_results(self._path.parent, now)
+        file, changes = self._file(asked), asked["changes"]
+        rows = list_results(self._path.parent, file.with_changes(changes))
+        for row in rows:
+            before = row.pop("before", {})
+            with suppress(InputError):  # the page has no fields for some values
+                file.with_changes(changes | before)
+                row["back"] = before
+        return rows
 
     def shown(self, asked: Any) -> dict[str, object]:
         return shown([self.inside(str(one)) for one in asked["folders"][:2]])

@@ -20,7 +20,7 @@ async function refresh(tick = ticked) {
     const box = element("input", { type: "checkbox", value: row.folder, disabled: Boolean(row.unusable), checked: kept.includes(row.folder) });
     const item = element("li", {}, element("label", {}, box, ` ${row.folder}`), element("small", {}, ...onPage(row.words)));
     if (row.stopped) item.append(element("small", { className: "warning", textContent: row.stopped }));
-    if (row.stale) item.append(element("small", { className: "warning", textContent: `${row.stale} Its report and process sheet have what it had.` }));
+    if (row.stale) item.append(element("small", { className: "warning", textContent: `${row.stale} Its report and process sheet have what it had.` }), ...onward(row));
     if (row.is_study) item.append(button("see its candidates", () => followStudy(row.folder)), " ");
     for (const [paper, file, name] of row.unusable ? [] : FILES)
       item.append(row[file] ? link(row.folder, file, `open the ${name}`) : maker(paper, row.folder, file, name), " ");
@@ -29,7 +29,15 @@ async function refresh(tick = ticked) {
   if (!rows.length) list.append(element("li", { textContent: "none yet: simulate, or run a study" }));
   allow();
   const stale = rows.filter((row) => row.stale && seen.includes(row.folder));
-  find("stale").replaceChildren(...stale.map((row) => element("p", { className: "warning", textContent: `${row.folder}: ${row.stale}` })));
+  find("stale").replaceChildren(...stale.map((row) => element("p", { className: "warning", textContent: `${row.folder}: ${row.stale}` }, ...onward(row))));
+}
+
+// What can be done about a result of another design: take its numbers, or simulate the design as it is.
+function onward({ folder, back }) {
+  const take = button("Take its numbers into the design", () => { change(back); say(`The design has the numbers of ${folder} now: save it, or undo.`, true); });
+  take.dataset.take = folder;
+  const simulate = button("Simulate the design as it is now", () => document.querySelector("[data-tab=run]").click());
+  return [" ", ...Object.keys(back ?? {}).length ? [take, " "] : [], simulate, " "];
 }
 
 function maker(paper, folder, file, name) {

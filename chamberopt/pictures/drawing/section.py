@@ -47,6 +47,7 @@ PRESSED = 0.9  # cosine from which on jaws press along an axis
 FIRST_ROW, ROWS = 4.0, 4.2
 CROSS = 4.0  # mm on paper, of the lines that cross in the middle of an opening
 MOST_CENTRES = 1  # heights of openings on each side of a section
+LETTER = 1.0  # mm on paper, width of a letter of a name of a holder
 ROOM = "#e8f1f7"
 
 
@@ -279,7 +280,12 @@ def _draw_fixtures(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
             text = f"{name}\n{size}".strip()
             style: Any = {"size": 5.0, "va": "center", "bbox": LABEL}
             in_body = area.contains(shapely.Point(view.chamber_point(middle)))
-            if in_body and right - left > SHORT:
-                axes.text(middle[0], middle[1], text, ha="center", **style)
-            else:
-                axes.text(right + 1.0, middle[1], text, ha="left", **style)
+            wide = LETTER * max(map(len, text.split("\n")))
+            walls = view.place([view.low, view.high])[:, 0]
+            if in_body and right - left > max(SHORT, wide):
+                x, ha = middle[0], "center"
+            elif right + 1.0 + wide < walls[1] or left - 1.0 - wide < walls[0]:
+                x, ha = right + 1.0, "left"
+            else:  # there a wall would be behind it
+                x, ha = left - 1.0, "right"
+            axes.text(x, middle[1], text, ha=ha, **style)
