@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Literal
 from chamberopt.chamber.checks.calibration import misfit_texts
 from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.number_text import percent
-from chamberopt.coverage.metrics import OBJECTIVES
 from chamberopt.documents.coverage import change, is_bound
 from chamberopt.documents.document import AnswerLine
 from chamberopt.documents.ranges import range_answer
@@ -66,9 +65,9 @@ def answer(result: Result, start: Result | None) -> str:
             f"{mean.format(result.metrics['mean_coverage'])} on average"
         )
         if label.text != mean.text:
-            text += f", and its {label.text} is {label.format(result.objective)}"
+            text += f", and its {label.in_full} is {label.format(result.objective)}"
         return f"{text} (95 % intervals); {full_coverage(result)}."
-    named = label.text if result.objective_name in OBJECTIVES else label.in_full
+    named = label.in_full
     before, after = label.format(start.objective), label.format(result.objective)
     study = result.study
     if study is not None and study.best.parameters == study.start.parameters:

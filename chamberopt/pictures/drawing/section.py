@@ -278,14 +278,15 @@ def _draw_fixtures(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
             middle = 0.5 * (left + right), 0.5 * (low + high)
             size = size_in_words(one.kind, [1e3 * side for side in one.size], unit="")
             text = f"{name}\n{size}".strip()
-            style: Any = {"size": 5.0, "va": "center", "bbox": LABEL}
+            style: Any = {"size": 5.0, "bbox": LABEL}
             in_body = area.contains(shapely.Point(view.chamber_point(middle)))
             wide = LETTER * max(map(len, text.split("\n")))
             walls = view.place([view.low, view.high])[:, 0]
             if in_body and right - left > max(SHORT, wide):
-                x, ha = middle[0], "center"
-            elif right + 1.0 + wide < walls[1] or left - 1.0 - wide < walls[0]:
-                x, ha = right + 1.0, "left"
-            else:  # there a wall would be behind it
-                x, ha = left - 1.0, "right"
-            axes.text(x, middle[1], text, ha=ha, **style)
+                x, y, look = middle[0], middle[1], {"ha": "center", "va": "center"}
+            elif right + 1.0 + wide < walls[1] or left > walls[1]:
+                x, y, look = right + 1.0, middle[1], {"ha": "left", "va": "center"}
+            else:  # beside it a wall would be behind the name
+                x, y = min(middle[0], walls[1] - 0.5 * wide - 0.5), high + 0.6
+                look = {"ha": "center", "va": "bottom"}
+            axes.text(x, y, text, **look, **style)

@@ -80,6 +80,17 @@ def test_what_is_in_the_middle_has_no_dimension_but_along_its_holder(tmp_path: P
     assert distinct([3.0, 1.0, 3.02], known=[1.0]) == [3.0]
 
 
+def test_no_wall_is_behind_the_name_of_a_short_holder(tmp_path: Path) -> None:
+    """A rod of 6 mm between the part and the wall on the right, at 1:1."""
+    cube = trimesh.creation.box((10.0, 10.0, 10.0))
+    held = {"holder": {"kind": "rod", "axis": (1.0, 0.0, 0.0), "diameter_mm": 4.0}}
+    axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
+    chamber = room_with(cube, tmp_path, (9.0, 0.0), **held)
+    draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0), {})
+    (name,) = (one for one in axes.texts if one.get_text().startswith("holder"))
+    assert (name.get_ha(), name.get_va()) == ("center", "bottom")
+
+
 def test_a_part_is_broken_off_before_a_hole_beyond_the_chamber(tmp_path: Path) -> None:
     """A bar of 80 mm with a hole of 4 mm, from 5 mm outside on: 15 mm would be drawn of it."""
     bar = trimesh.creation.box((80.0, 6.0, 6.0))
