@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 
 from chamberopt.common.estimate import CONFIDENCE, Estimate
+from chamberopt.common.key_words import title_with_unit
 from chamberopt.common.number_text import estimate_text
 from chamberopt.documents.coverage import labels_of, main_names
 from chamberopt.documents.document import Table
@@ -46,7 +47,7 @@ def summary(comparison: Comparison) -> list[Table | str]:
         sentences.append("No number of the designs differs: they were simulated again.")
     several = len(later) > 1
     rows = [
-        [name, *map(_shown, values), *[""] * (not several)]
+        [title_with_unit(name), *map(_shown, values), *[""] * (not several)]
         for name, values in comparison.parameters.items()
     ]
     for name, label in shown:

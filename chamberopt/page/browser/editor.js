@@ -154,8 +154,8 @@ function sayOf({ facts, unpeened, warnings, notes }) {
 
 listen((what) => {
   if (what === "read") {
-    find("file").textContent = `${state.file.folder.split(/[\\/]/).pop()}: ${state.file.file}`;
-    find("file").title = state.file.folder;
+    find("file").textContent = `${state.file.folder.split(/[\\/]/).pop()}: ${state.file.file.replace(/\.toml$/, "")}`;
+    find("file").title = `${state.file.file} in ${state.file.folder}`;
     document.title = `${state.file.file}: chamberopt`;
     shownOf = structure();
     makeFields();

@@ -8,7 +8,8 @@ const find = (id) => document.getElementById(id);
 export function fillRun() {
   const before = find("of").value;
   const names = state.file.files.map((one) => one.name);
-  find("of").replaceChildren(...state.file.files.map(({ name, words }) => element("option", { value: name, textContent: `${name}: ${words}` })));
+  find("of").replaceChildren(...state.file.files.map(({ name, kind, words }) => element("option", { value: name,
+    textContent: kind === "study" ? `study ${name}: ${words}` : `${words} (${name})` })));
   find("of").value = names.includes(before) ? before : state.file.file;
   const free = (k) => `study-of-sliders${k > 1 ? `-${k}` : ""}.toml`;
   let k = 1;
