@@ -147,8 +147,11 @@ def load_start(result: Result) -> Result | None:
     """
     if result.study is None:
         return None
-    with _damage_explained(result.folder / START):
-        return load_result(require_plain_folder(result.folder / START, RESTORE))
+    start = result.folder / START
+    if not start.exists():
+        raise InputError(f"{start}: not there, and a study has it; {RESTORE}")
+    with _damage_explained(start):
+        return load_result(require_plain_folder(start, RESTORE))
 
 
 def load_trials(folder: Path) -> list[Trial]:

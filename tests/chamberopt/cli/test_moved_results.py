@@ -133,7 +133,7 @@ def test_a_study_sent_elsewhere_is_whole(
     capsys.readouterr()
     shutil.rmtree(start)
     assert main(["report", str(best)]) == 2
-    assert "not a results folder" in capsys.readouterr().err
+    assert f"{start}: not there, and a study has it" in capsys.readouterr().err
 
 
 def commands(folder: Path, out: Path) -> list[list[object]]:

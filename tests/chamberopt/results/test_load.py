@@ -2,11 +2,13 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 from chamberopt.common.errors import InputError
-from chamberopt.results.load import load_result
+from chamberopt.results.load import Result, load_result, load_start
 from chamberopt.results.records import FORMAT
 from chamberopt.workflows import save_run
 from chamberopt.workflows.save_run import save_simulation
@@ -80,3 +82,9 @@ def test_a_link_that_leads_back_to_itself_is_refused(tmp_path: Path) -> None:
     loop.symlink_to(loop)
     with pytest.raises(InputError, match="a link that leads back to itself"):
         load_result(loop)
+
+
+def test_a_study_without_its_start_says_where_it_was(tmp_path: Path) -> None:
+    study = cast(Result, SimpleNamespace(study="a study", folder=tmp_path))
+    with pytest.raises(InputError, match=r"start: not there, and a study has it; restore"):
+        load_start(study)
