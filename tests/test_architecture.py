@@ -45,8 +45,8 @@ ORDER = {
     "chamberopt/search": "study+optimiser trial_log study_folder "
     "sensitivity+observe+candidate judge ask_and_tell run_study pareto+run_sweep",
     "chamberopt/results": (
-        "vtp_files records load arrays_file write rebuild flight+impacts+impact_energy compare "
-        "command_records"
+        "vtp_files records load arrays_file looked_places write rebuild "
+        "flight+impacts+impact_energy compare command_records"
     ),
     "chamberopt/pictures": "charts+quantities drawing camera drawn_part "
     "actors+overlay+subprocess_drawing view picture_page panels "

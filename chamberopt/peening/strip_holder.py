@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,10 +26,10 @@ from chamberopt.design.load import Design
 from chamberopt.design.shapes.base import ParametricChamber, PolygonChamber
 from chamberopt.design.shapes.straight import Cylinder
 from chamberopt.geometry.triangles import area_vectors
+from chamberopt.peening.strip import StripSize
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
-    from chamberopt.peening.strip import StripSize
 
 HOLDER_FILE = "strip_holder.obj"
 STRIP_GROUP = "strip"
@@ -123,27 +123,61 @@ def _outline_mm(chamber: ParametricChamber, height: float) -> np.ndarray:
     return np.asarray(points[ConvexHull(points).vertices])
 
 
-def _require_room(size: StripSize, outline: np.ndarray) -> None:
-    """Raise InputError, with the sizes that fit, unless the strip is inside the outline [mm]."""
+class StripRoom(NamedTuple):
+    """The largest strip of the proportions of a whole one, and the largest disc, in a lid [mm]."""
+
+    length: float
+    width: float
+    disc: float
+
+    @property
+    def in_words(self) -> str:
+        """Both sizes, such as "a strip of 38 x 9.4 mm or a disc of 40 mm"."""
+        return f"a strip of {self.length:g} x {self.width:g} mm or a disc of {self.disc:g} mm"
+
+
+def strip_room(design: Design) -> StripRoom | None:
+    """Return what fits into a lid in the place of the part; None if the chamber takes no lid."""
+    try:
+        outline = _lid_of(design, None)[2]
+    except InputError:
+        return None
+    return _largest(StripSize(), outline)
+
+
+def _largest(size: StripSize, outline: np.ndarray) -> StripRoom:
+    """Return the largest strip of a size's proportions, and disc, inside an outline (n, 2) [mm]."""
+    rectangle = 500.0 * np.array([[size.length, size.width], [size.length, -size.width]])
+    length = 0.1 * math.floor(
+        10.0 * _growth(np.r_[rectangle, -rectangle], outline) * 1e3 * size.length
+    )
+    width = math.floor(10.0 * length * size.width / size.length) / 10
+    disc = 0.1 * math.floor(10.0 * 2.0 * float(_sides(outline)[1].min()))
+    return StripRoom(length, width, disc)
+
+
+def _sides(outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the normal of each side of an outline, (n, 2), and its distance from the middle."""
     along = np.roll(outline, -1, axis=0) - outline
     normal = np.c_[along[:, 1], -along[:, 0]] / np.linalg.norm(along, axis=1)[:, None]
-    reach = (normal * outline).sum(axis=1)  # distance of each side from the middle
+    return normal, (normal * outline).sum(axis=1)
 
-    def share(edge: np.ndarray) -> float:
-        """Return the factor by which an outline, corners (n, 2), could grow and still fit."""
-        return float((reach / (edge @ normal.T).max(axis=0)).min())
 
-    if share(_edge_mm(size)) >= 1.0 - FIT_MM:
+def _growth(edge: np.ndarray, outline: np.ndarray) -> float:
+    """Return the factor by which an edge, corners (n, 2), could grow and still fit an outline."""
+    normal, reach = _sides(outline)
+    return float((reach / (edge @ normal.T).max(axis=0)).min())
+
+
+def _require_room(size: StripSize, outline: np.ndarray) -> None:
+    """Raise InputError, with the sizes that fit, unless the strip is inside the outline [mm]."""
+    if _growth(_edge_mm(size), outline) >= 1.0 - FIT_MM:
         return
-    rectangle = 500.0 * np.array([[size.length, size.width], [size.length, -size.width]])
-    fits = 0.1 * math.floor(10.0 * share(np.r_[rectangle, -rectangle]) * 1e3 * size.length)
-    disc = 0.1 * math.floor(10.0 * 2.0 * float(reach.min()))
+    room = _largest(size, outline)
     given = f"a {size}" if size.is_disc else f"a strip of {size}"
-    offers = f"--disc-mm {disc:g}"
+    offers = f"--disc-mm {room.disc:g}"
     if not size.is_disc:
-        offers += (
-            f" or --size-mm {fits:g} {math.floor(10.0 * fits * size.width / size.length) / 10:g}"
-        )
+        offers += f" or --size-mm {room.length:g} {room.width:g}"
     raise InputError(
         f"{given} does not fit into the chamber there; there is room for {offers}: give the size "
         "of a small strip that you have, or use --at ZONE"

@@ -6,7 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from chamberopt.pictures.actors import SCATTER, add_edges, add_part, body_meanings, colour_meanings
+import numpy as np
+
+from chamberopt.pictures.actors import (
+    SCATTER,
+    add_edges,
+    add_numbers,
+    add_part,
+    body_meanings,
+    colour_meanings,
+)
 from chamberopt.pictures.camera import target_in_chamber
 from chamberopt.pictures.drawn_part import DrawnPart, beyond, colour_range
 from chamberopt.pictures.panels import choose_views, part_panels
@@ -17,7 +26,11 @@ from chamberopt.results.vtp_files import size_text
 
 
 def draw_coverage(
-    folders: Sequence[str | Path], titles: Sequence[str], picture: str | Path, columns: int = 3
+    folders: Sequence[str | Path],
+    titles: Sequence[str],
+    picture: str | Path,
+    columns: int = 3,
+    marks: Sequence[Sequence[float]] = (),
 ) -> str | None:
     """Draw the coverage of one result, or of several below one another on one colour scale.
 
@@ -26,11 +39,18 @@ def draw_coverage(
         titles: a title for each result.
         picture: file to write, .png.
         columns: views beside one another; further ones of a result are below them.
+        marks: places on the part that get numbers from 1 on, each with the normal there, (n, 6)
+            [mm].
 
     Returns:
         None, or one line that says why there is no picture.
     """
-    job = {"folders": [str(one) for one in folders], "titles": list(titles), "columns": columns}
+    job: dict[str, Any] = {
+        "folders": [str(one) for one in folders],
+        "titles": list(titles),
+        "columns": columns,
+    }
+    job["marks"] = [list(one) for one in marks]
     return draw_in_subprocess(render_coverage, job, picture)
 
 
@@ -54,6 +74,7 @@ def render_coverage(job: dict[str, Any]) -> None:
         def add(plotter: Any, part: DrawnPart = part) -> None:
             add_part(plotter, part, limits)
             add_edges(plotter, part.surface)
+            add_numbers(plotter, np.reshape(job["marks"], (-1, 6)), part.surface.length)
 
         panels = part_panels(add, part.inside, part.surface, chamber, views)
         for first in range(0, len(panels), job["columns"]):

@@ -51,8 +51,9 @@ from chamberopt.pictures.drawing.cuts import face_size_mm
 from chamberopt.pictures.drawing.dimensions import Limits
 from chamberopt.pictures.drawing.openings import draw_openings
 from chamberopt.printers.report_page import PageFile, require_free_page
-from chamberopt.results.arrays_file import load_chamber
+from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.load import load_result
+from chamberopt.results.looked_places import looked_places
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,6 +63,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.checks.openings import Opening
     from chamberopt.design.sonotrode import Face
+    from chamberopt.results.looked_places import LookedPlace
 
 SHEET = "process_sheet.pdf"
 CREATOR = "chamberopt process sheet"  # marks a sheet, so that a newer sheet may replace it
@@ -82,7 +84,7 @@ VIEWS_A_ROW = 2  # of the picture of the coverage, where no outlines are below i
 NO_COVERAGE = "No page shows the coverage by place: {}."
 COVERAGE = (
     "Share of the surface that is dented after the treatment time, simulated, in windows round "
-    "each place. Look first where it is least."
+    "each place. Numbers: where to look, see Acceptance; one that no view shows is hidden."
 )
 COLUMNS = (88.0, 62.0, 36.0)  # mm, of a table with a head
 MM_PER_PT = 25.4 / 72.0
@@ -290,7 +292,8 @@ def write_sheet(
     loaded = load_result(result)
     path = require_free_page(loaded.folder / SHEET if path is None else path, SHEET_FILE)
     with claim_file(path):
-        chamber = load_chamber(loaded)
+        arrays = load_result_arrays(loaded)
+        chamber, places = arrays.chamber, looked_places(arrays)
         design, part, openings = loaded.design, chamber.part, find_openings(chamber)
         clear = clearance_of(loaded)
         built = AsBuilt(
@@ -306,6 +309,7 @@ def write_sheet(
             largest_flat_face(part),
             part_is_ceiling(chamber),
             outside_clamp(chamber).text,
+            places,
         )
         sheet = process_sheet(loaded, built, revision)
         limits = slit_limits(loaded) | chamber_limits(loaded) | reference_limits(loaded, openings)
@@ -316,24 +320,27 @@ def write_sheet(
             limits,
             design.sonotrode.face,
             outlines,
-            coverage_map(loaded.folder, 3 if outlines else VIEWS_A_ROW),
+            coverage_map(loaded.folder, 3 if outlines else VIEWS_A_ROW, places),
             1e3 * clear,
         )
         _save(path, pages, sheet.name)
     return path, sheet
 
 
-def coverage_map(folder: Path, columns: int) -> np.ndarray | str:
+def coverage_map(
+    folder: Path, columns: int, places: Sequence[LookedPlace] = ()
+) -> np.ndarray | str:
     """Return the picture of a result's coverage, drawn anew, or why it cannot be drawn here.
 
-    It has so many columns of views. The picture in the folder may not be that of the result, as it
-    has no digest.
+    It has so many columns of views, and numbers at places to look at. The picture in the folder may
+    not be that of the result, as it has no digest.
     """
     from matplotlib.image import imread
 
+    marks = [[*map(float, 1e3 * one.at), *map(float, one.normal)] for one in places]
     with private_folder() as own:
         picture = Path(own) / "coverage.png"
-        if reason := draw_coverage([folder], [""], picture, columns):
+        if reason := draw_coverage([folder], [""], picture, columns, marks):
             return reason.removeprefix(f"{picture.name} ").removeprefix("skipped: ")
         return np.asarray(imread(picture))[..., :3]
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.documents.answer import answer
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
+from chamberopt.documents.sheet.acceptance import acceptance_rows
 from chamberopt.documents.sheet.expected import calibrated_to, expected_rows, first_checks
 from chamberopt.documents.sheet.rows import AsBuilt, Row
 from chamberopt.documents.sheet.settings import (
@@ -116,6 +117,7 @@ def setting_tables(result: Result, built: AsBuilt) -> list[Table]:
         ("Shot", shot_rows(result)),
         ("Steps", step_rows(result, built)),
         ("To peen a part", run_rows(result, built)),
+        ("Acceptance", acceptance_rows(result, built)),
         ("Peening, and what to expect", expected_rows(result, built.usual)),
     ])  # fmt: skip
 

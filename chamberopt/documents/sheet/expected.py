@@ -25,7 +25,7 @@ from chamberopt.documents.sheet.rows import (
     weighed_g,
     with_limits,
 )
-from chamberopt.documents.wanted import wanted_rows
+from chamberopt.documents.wanted import time_lines, wanted_rows
 from chamberopt.documents.wording import metric_label, plain
 from chamberopt.peening.strip import StripSize
 from chamberopt.peening.strip_holder import why_no_strip
@@ -35,10 +35,9 @@ if TYPE_CHECKING:
     from chamberopt.documents.coverage import Figure
     from chamberopt.results.load import Result
 
-TIME, UNIFORM = "time_to_98_s", "uniform_coverage"
-UNIFORM_IS = (
-    "Uniform coverage is the mean less the standard deviation over the target: 1 if all is covered."
-)
+TIME = "time_to_98_s"
+# The aim of searches, which nobody on the shop floor acts on.
+UNIFORM = "uniform_coverage"
 NO_INTENSITY = (
     "Almen intensity in mmA is not known before strips are peened here: see Measure first."
 )
@@ -67,7 +66,9 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
     Without a calibration, a row says why there is no intensity in mmA.
     """
     of_all = ", all steps together" if result.design.steps else ""
+    unset = any(one.warns for one in time_lines(result)[:1])
     time = f"{plain(result.design.process.treatment_time)} s{of_all}"
+    time += " to start with, NOT YET SET: see 3 peen" if unset else ""
     yield "peening time", with_limits(result, "process.treatment_time_s", time)
     yield from wanted_rows(result)
     calibration = result.design.calibration
@@ -92,8 +93,6 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
             yield "", first
             if rest:
                 yield "", f"{over.strip()}{rest}"
-    if UNIFORM in [row.name for row in shown]:
-        yield "", UNIFORM_IS
     yield "", f"± 95 % intervals. {limits_of_intervals(result, has_groups=True)}"
 
 
@@ -101,14 +100,16 @@ def expected_figures(result: Result) -> list[Figure]:
     """Return the figures that the sheet shows: the objective first, then those of EXPECTED.
 
     A mean coverage with a bound alone is left out, as among the main figures.
+    Uniform coverage is none of them.
     """
     calibration, shown = result.design.calibration, figures(result, None)
     hidden = "strength_um" if calibration and calibration.has_strips else ""
     return [
         row
         for row in shown
-        if row is shown[0]
-        or (row.name in EXPECTED and row.name != hidden and not row.is_bound_mean)
+        if (row is shown[0] or row.name in EXPECTED)
+        and row.name not in (hidden, UNIFORM)
+        and (row is shown[0] or not row.is_bound_mean)
     ]
 
 
@@ -165,7 +166,7 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
                 f"; in the lid in place of the part, {level_mm} mm from the sonotrode, facing it"
             )
         elif level_mm is not None:
-            strips += f"; no strip of {StripSize()} fits into the lid: a smaller one, or on a zone"
+            strips += f"; no strip of {StripSize()} fits into the lid: see intensity in Acceptance"
         yield strips, known
     else:
         text = metric_label("almen_intensity").format(intensity)

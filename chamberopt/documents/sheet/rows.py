@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from chamberopt.design.shot import ShotTable
     from chamberopt.design.sonotrode import VibratingFace
     from chamberopt.results.load import Result
+    from chamberopt.results.looked_places import LookedPlace
 
 Row = tuple[str, str]  # a name and its value, or "" and a sentence
 
@@ -42,6 +43,7 @@ class AsBuilt(NamedTuple):
     flat: FlatFace | None = None  # the part's largest, by which it is seen how it is turned
     is_ceiling: bool = False  # the part closes the room, which has no other ceiling
     clamp: str = ""  # what clamps the part where it stands out, in words
+    places: Sequence[LookedPlace] = ()  # of the target to look at, the least covered first
 
 
 def for_the_shop(text: str) -> str:

@@ -1,0 +1,112 @@
+"""Tell on a process sheet by what a part is accepted or rejected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from chamberopt.common.number_text import rounded
+from chamberopt.documents.sheet.rows import AsBuilt, Row
+from chamberopt.documents.wanted import intensity_text
+from chamberopt.documents.wording import per_cent, plain
+from chamberopt.peening.strip import StripSize
+from chamberopt.peening.strip_holder import strip_room, why_no_strip
+
+if TYPE_CHECKING:
+    from chamberopt.results.load import Result
+
+TIME = "time_to_98_s"
+LENS = "a magnifier of 10 to 30 times (SAE J2277)"
+COVERED = 0.98  # share of dents that counts as full coverage (SAE J2277)
+LEAST_MISSED = 5e-3  # share of the target out of reach that is told
+COUPON = (
+    "a coupon of the part's metal in its place, which SAE AMS 2580A allows where no strip can be"
+)
+
+
+def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
+    """Yield rows on where and when to look, what to see there, and what intensity is accepted by.
+
+    Args:
+        built: with the places to look at; none where too few dents tell them apart.
+    """
+    places = built.places
+    if places:
+        listed = "; ".join(
+            f"{number} at ({', '.join(plain(round(x, 1) + 0.0) for x in one.of_file_mm)})"
+            for number, one in enumerate(places, 1)
+        )
+        yield (
+            "places to look at",
+            f"{listed} mm of the part's file, numbered on the page Coverage by place: where the "
+            f"fewest dents are expected, off the edges; by {LENS}",
+        )
+        if not result.design.steps:
+            yield "first part", _first_part(result, built)
+    else:
+        yield "places to look at", f"all of the target, by {LENS}: too few dents tell places apart"
+    seen = f"each of places 1 to {len(places)}" if len(places) > 1 else "the target"
+    missed = 1.0 - result.record.field.reachable_share
+    but = f", but {missed_text(missed)} that no ball can touch (see Warnings)"
+    yield (
+        "ACCEPT or REJECT",
+        f"ACCEPT coverage if dents lie on {per_cent(COVERED)} or more of {seen}, and nothing else "
+        f"of the target is bare{but if missed > LEAST_MISSED else ''}. If not, peen the part for "
+        "the same time once more and look again; REJECT it if it is still less.",
+    )
+    yield "intensity", _intensity(result, built)
+
+
+def missed_text(missed: float) -> str:
+    """Return a share of the target that no ball can touch in words."""
+    return f"the {per_cent(missed)}" if missed >= LEAST_MISSED else "less than 1 %"
+
+
+def _first_part(result: Result, built: AsBuilt) -> str:
+    """Return in words after which time to stop the first part, and what to see there by then.
+
+    It is half of the time to 98 %, where shares still tell a slow machine from a quick one, and no
+    longer than the part is to be peened.
+    """
+    planned, time = result.design.process.treatment_time, result.metrics.get(TIME)
+    half = 0.5 * (planned if time is None or not time.has_number else time.value)
+    after = min(half, planned)
+    what = "half of the time to 98 %" if after == half and half != 0.5 * planned else ""
+    shares = [one.coverage(after / planned) for one in built.places]
+    told = ", ".join(f"{per_cent(x)} at {k}" for k, x in enumerate(shares, 1))
+    ranges, exposure = result.record.ranges, result.metrics.get("exposure")
+    ends = None if ranges is None else ranges.figures.get("exposure")
+    more = ""
+    if ends is not None and exposure is not None and exposure.value > 0.0:
+        low, high = (
+            100.0 * one.coverage(after / planned * end / exposure.value)
+            for one, end in ((built.places[0], x) for x in (ends.low.value, ends.high.value))
+        )
+        more = f" ({rounded(low, 2)} to {rounded(high, 2)} % at 1 before calibration)"
+    return (
+        f"stop it after {plain(after, 2)} s{f', {what},' if what else ''} and look: dents are "
+        f"expected on about {told}{more}. Where fewer are seen, the machine peens more slowly than "
+        "was simulated, and the peening time is to be found as of a time that is not set."
+    )
+
+
+def _intensity(result: Result, built: AsBuilt) -> str:
+    """Return in words what accepts the intensity, or that nothing does yet."""
+    design = result.design
+    wanted = intensity_text(design)
+    if "almen_intensity" in result.metrics:
+        by = "strips at the target, after the times of Measure first"
+        return f"ACCEPT {wanted} by {by}" if wanted else f"no range is asked for: record it by {by}"
+    not_by_dents = "not accepted by coverage"
+    if not why_no_strip(design, StripSize()):
+        aim = f"ACCEPT {wanted}" if wanted else "agree on a range in mmA"
+        return f"{not_by_dents}: {aim} by strips in the lid, as under Measure first"
+    room = strip_room(design)
+    if room is None:
+        return f"{not_by_dents}: no lid takes a strip here; {COUPON}"
+    level = "" if built.level_mm is None else f" {built.level_mm} mm from the sonotrode"
+    return (
+        f"{not_by_dents}, and no whole strip fits. The largest: {room.in_words}, flush in a steel "
+        f"lid{level} in the place of the part, held at its edges. Its arc heights are no mmA: they "
+        f"ACCEPT that a set-up peens as an approved one did, not a first one. Or {COUPON}"
+    )

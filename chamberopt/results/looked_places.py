@@ -1,0 +1,81 @@
+"""Find where to look at a peened target: where the fewest dents are expected, in several places."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
+from chamberopt.geometry.triangles import areas
+
+if TYPE_CHECKING:
+    from chamberopt.results.arrays_file import ResultArrays
+
+MOST_PLACES = 3
+# Patches are cubes of the target's diagonal over this, of which dents are told as a mean: single
+# windows scatter, and the least of many would tell of luck. Places are two patches apart.
+PATCHES = 8.0
+LEAST_FILLED = 0.25  # area of a patch over that of its cube's side
+
+
+class LookedPlace(NamedTuple):
+    """A patch of the target to look at.
+
+    Attributes:
+        at: its middle on the surface, in the chamber's frame [m], (3,).
+        normal: out of the part, (3,).
+        of_file_mm: the same place in the frame of the part's file.
+        density: of the dents expected in it after the treatment time, such that its coverage is
+            1 - exp(-density).
+    """
+
+    at: np.ndarray
+    normal: np.ndarray
+    of_file_mm: tuple[float, float, float]
+    density: float
+
+    def coverage(self, times: float) -> float:
+        """Return the expected coverage after a multiple of the treatment time."""
+        return float(coverage_from_dent_density(np.array(times * self.density)))
+
+
+def looked_places(arrays: ResultArrays) -> list[LookedPlace]:
+    """Return the least covered patches of a target, apart from each other, the least first.
+
+    There are none where too few dents were simulated to tell places apart, or where the part's file
+    is not known.
+    """
+    display, part = arrays.display, arrays.chamber.part
+    mesh, fields = display.mesh, display.fields
+    corners = mesh.triangles[part.target[mesh.part_triangle]]
+    shares = np.repeat(areas(mesh.vertices, corners) / 3.0, 3)
+    weight = np.bincount(corners.ravel(), shares, len(mesh.vertices))
+    known = (weight > 0.0) & (fields["reachable"] > 0.5) & (fields["resolved"] > 0.5)
+    if not known.any() or part.file is None:
+        return []
+    place, weight = mesh.vertices[known].astype(float), weight[known]
+    covered = coverage_from_dent_density(fields["dent_density"][known].astype(float))
+    side = float(np.linalg.norm(np.ptp(place, axis=0))) / PATCHES
+    # Both sides of a thin plate are patches of their own.
+    looks = np.sign(np.round(mesh.normal[known], 1))
+    cell = np.concatenate([np.floor(place / side), looks], axis=1)
+    _, patch = np.unique(cell, axis=0, return_inverse=True)
+    patch = patch.reshape(-1)
+    area = np.bincount(patch, weight)
+    mean = np.bincount(patch, weight * covered) / area
+    middle = np.stack([np.bincount(patch, weight * x) / area for x in place.T], axis=1)
+    found: list[LookedPlace] = []
+    for one in np.argsort(mean, kind="stable"):
+        own = np.flatnonzero(patch == one)
+        nearest = own[np.linalg.norm(place[own] - middle[one], axis=1).argmin()]
+        at = place[nearest]
+        is_apart = all(np.linalg.norm(at - other.at) > 2.0 * side for other in found)
+        if area[one] < LEAST_FILLED * side**2 or not is_apart:
+            continue
+        x, y, z = (1e3 * (at - part.file.shift) @ part.file.rotation).tolist()
+        density = -float(np.log1p(-min(mean[one], 1.0 - 1e-9)))
+        found.append(LookedPlace(at, mesh.normal[known][nearest], (x, y, z), density))
+        if len(found) == MOST_PLACES:
+            break
+    return found
