@@ -26,18 +26,19 @@ from chamberopt.common.number_text import NO_BREAK, held_together, plain, rounde
 from chamberopt.documents.document import Table
 from chamberopt.geometry.triangles import areas
 from chamberopt.peening.strip import StripSize
-from chamberopt.peening.strip_holder import target_level_mm, why_no_strip
+from chamberopt.peening.strip_holder import strip_room, target_level_mm, why_no_strip
 
 if TYPE_CHECKING:
     from chamberopt.chamber.layout.target import Surface
     from chamberopt.chamber.propose.proposal import BallTrial, PoseTrial, Proposal
     from chamberopt.chamber.propose.proposed_mask import LeftOut
+    from chamberopt.design.design import Design
 
 WIDTH, INDENT = 79, 13  # columns
 MOST_LISTED = 6  # surfaces, without --verbose
 SIMULATED = "simulated"  # the row that is told with --verbose alone
-SERVES = (
-    "Balls touch a place that they get to. They serve it if it also lies in no fillet of less than "
+SUITS = (
+    "Balls touch a place that they get to. They suit it if it also lies in no fillet of less than "
     f"{1 / OF_FILLET:g} diameters' radius and in no slot of less than {1 / OF_SLOT:g} diameters: "
     "these are peened slowly. It is covered once dents lie on it."
 )
@@ -153,8 +154,8 @@ def proposal_lines(told: ProposalInWords, verbose: bool) -> list[Table | str]:
         lines += ["", "To be settled before it is built:"]
         for number, matter in enumerate(told.matters, 1):
             lines += wrapped(f"{number:2}. {matter.mark}{matter.text}", 4)
-    if told.trials or any("serve" in reason for row in told.rows for reason in row.reasons):
-        lines += ["", *wrapped(SERVES, 0)]
+    if told.trials or any("suit" in reason for row in told.rows for reason in row.reasons):
+        lines += ["", *wrapped(SUITS, 0)]
     most = len(told.choices) if verbose else MOST_LISTED
     return [*lines, "", *choice_lines(told.choices, most)]
 
@@ -309,16 +310,36 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     if INTENSITY in made.reasons:
         value = clauses(made.reasons[INTENSITY])[0][0].partition(": ")[0]
         yield "intensity", value, (INTENSITY,)
-        level = target_level_mm(made.chamber)
-        strips = (
-            f"in the lid in place of the part, {level} mm from the sonotrode as the middle of the "
-            f"target is: chamberopt strip --distance-mm {level}"
-        )
-        yield "strips", why_no_strip(design, StripSize()) or strips, ()
+        yield "strips", _strips(design, target_level_mm(made.chamber)), ()
     accuracy = design.process.accuracy
     simulated = f"{accuracy.replicas} replicas of {plain(accuracy.simulated_time, 3)} s"
     keys = tuple(f"process.accuracy.{key}" for key in tables["process.accuracy"])
     yield SIMULATED, simulated, keys
+
+
+def _strips(design: Design, level: int) -> str:
+    """Return in words which strips or what else tells the intensity of a proposal.
+
+    Args:
+        level: of the target's middle above the sonotrode [mm].
+    """
+    place = (
+        f"in the lid in place of the part, {level} mm from the sonotrode as the middle of the "
+        "target is"
+    )
+    if not why_no_strip(design, StripSize()):
+        return f"{place}: chamberopt strip --distance-mm {level}"
+    room = strip_room(design)
+    if room is None:
+        return (
+            "no lid of this chamber takes one: accept a part by its coverage, for which the "
+            "process sheet names places and shares, and the intensity by a coupon of its metal"
+        )
+    return (
+        f"no whole one fits; the largest {place}: {room.in_words} (chamberopt strip --disc-mm "
+        f"{room.disc:g} --distance-mm {level}); its arc heights are no mmA: accept a part by its "
+        "coverage, for which the process sheet names places and shares"
+    )
 
 
 def _balls(made: Proposal) -> Iterator[str]:
@@ -358,7 +379,7 @@ def _trials(made: Proposal) -> Table:
     """Return a table of the balls that pilots compared, one row a size."""
     taken = {round(1e3 * one.shot.diameter, 4) for one in made.design.in_steps.values()}
     several = any(one.sonotrode_count > 1 for one in made.trials)
-    head = ["balls", "touch", "serve", "amplitude", "intensity", "98 % after", "number"]
+    head = ["balls", "touch", "suit", "amplitude", "intensity", "98 % after", "number"]
     head += ["sonotrodes"] * several
     rows = []
     for one in made.trials:

@@ -18,7 +18,11 @@ if TYPE_CHECKING:
     from chamberopt.peening.range_result import RangedFigure, RangeResult, RivalAtEnds
     from chamberopt.results.load import Result
 
-WORDS = {"friction": "friction", "v0": "the yield speed", "slopes": "slopes of the faces"}
+WORDS = {
+    "friction": "friction",
+    "v0": "the least speed that dents",
+    "slopes": "slopes of the faces",
+}
 MEASURED_BY = {
     "friction": "the rate of impacts on the part (chamberopt calibrate)",
     "v0": "ball drops at 3 m/s on each surface (chamberopt calibrate)",
@@ -182,7 +186,7 @@ def slow_end_is_late(result: Result) -> bool:
 
 
 def groups_text(found: RangeResult) -> str:
-    """Return the names of what is not calibrated, such as "friction and the yield speed"."""
+    """Return the names of what is not calibrated, such as "friction and slopes of the faces"."""
     return _list(found.groups)
 
 

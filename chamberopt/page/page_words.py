@@ -160,22 +160,22 @@ def explained(html: str) -> str:
     return _SAID.sub(lambda said: said[1] + "".join(map(told, on_page(said[2], known))), html)
 
 
-# How `new` names balls and an amplitude that would serve (chamber/propose), in mm and µm.
-_BALLS = re.compile(r"([\d.]+) mm would serve|--ball-mm ([\d.]+) takes|balls of about ([\d.]+) mm")
+# How `new` names balls and an amplitude that would suit (chamber/propose), in mm and µm.
+_BALLS = re.compile(r"([\d.]+) mm would suit|--ball-mm ([\d.]+) takes|balls of about ([\d.]+) mm")
 _AMPLITUDE = re.compile(r"an amplitude of about ([\d.]+) µm zero-to-peak")
 
 
 def balls_named(text: str) -> list[float]:
-    """Return the diameters [mm] of balls that a matter says would serve.
+    """Return the diameters [mm] of balls that a matter says would suit.
 
-    >>> balls_named("MANY BALLS, to be dosed and sorted: 0.7 mm would serve 80%")
+    >>> balls_named("MANY BALLS, to be dosed and sorted: 0.7 mm would suit 80%")
     [0.7]
     """
     return list(dict.fromkeys(float(next(filter(None, one))) for one in _BALLS.findall(text)))
 
 
 def amplitudes_named(text: str) -> list[float]:
-    """Return the amplitudes [µm], zero-to-peak, that a matter says would serve."""
+    """Return the amplitudes [µm], zero-to-peak, that a matter says would suit."""
     return list(dict.fromkeys(map(float, _AMPLITUDE.findall(text))))
 
 

@@ -232,7 +232,7 @@ def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
             text = f"{its_text}; {_mm(best)} may jam in a gap of {1e3 * best.nearly_jam:.3g} mm"
             best = other
         else:
-            text += f"; {_of_play(best)}, or take {_mm(other)}, which serve {other.served:.0%}"
+            text += f"; {_of_play(best)}, or take {_mm(other)}, which suit {other.served:.0%}"
     elif best.nearly_jam and not best.jam:
         text += f"; {_of_play(best)}"
     blunt = [one for one in fits if one.diameter > best.diameter]
@@ -288,7 +288,7 @@ def _best_of(free: Sequence[SizeFit], fits: Sequence[SizeFit]) -> tuple[SizeFit,
     elif suited:
         best, small = as_good, suited[-1]
         text = (
-            f"serves {best.served:.0%} of the target; {_mm(small)} would serve {small.served:.0%}, "
+            f"suits {best.served:.0%} of the target; {_mm(small)} would suit {small.served:.0%}, "
             f"but take {small.count / best.count:.2g} times as many"
         )
     else:

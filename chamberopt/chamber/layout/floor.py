@@ -50,7 +50,9 @@ def of_blocks(ball: float) -> str:
     """Return what is said of a floor of several sonotrodes, for a diameter of the balls [m]."""
     return (
         "LARGER THAN ONE SONOTRODE: the floor is several side by side, which must vibrate in phase "
-        "and alike: settle with their maker how they are driven and tuned for that; gaps "
+        "and alike: settle with their maker how they are driven and tuned for that, and if they "
+        "cannot be, peen the target a length at a time over one of them (--shop, of a file with "
+        "pieces = 1); gaps "
         f"between them of {slit_in_words(1e3 * ball)}, half a ball"
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from chamberopt.chamber.shop import HARD, STEEL, Shop
 from chamberopt.common.errors import InputError
-from chamberopt.design.materials import alloy, ball, balls
+from chamberopt.design.materials import alloy, alloys, ball, balls, find
 
 CERAMIC = "zirconia"  # for metals on which steel leaves iron
 # Least hardness of steel balls over the part's. A part as hard as they are is dented less: in
@@ -51,6 +51,29 @@ def choose_shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
         on_steel = ON_STAINLESS if is_stainless else ""
         return found, IRON.get(metal, on_steel) if found == STEEL else ""
     return HARD, f"harder than the part, of {hardness:g} HB: balls of steel dent it less"
+
+
+def iron_of_walls(part: str, walls: str) -> str:
+    """Return what walls that may leave iron on a part's metal need; "" where they leave none.
+
+    Balls carry off what they wear from the walls, and press it into the part.
+
+    Args:
+        part, walls: their alloys; empty or of no catalogue where they are not known.
+    """
+    own, of_walls = find(part, alloys()), find(walls, alloys())
+    if own is None or of_walls is None or of_walls.metal != "steel":
+        return ""
+    is_spoiled = own.metal in IRON or (own.stainless and not of_walls.stainless)
+    if not is_spoiled:
+        return ""
+    name = "stainless steel" if own.stainless else own.metal
+    hard = "stainless steel" if own.stainless else "titanium or aluminium"
+    return (
+        f"IRON FROM THE WALLS: balls carry what they wear from {of_walls.name} onto {name}, "
+        f"whatever they are made of: walls of {hard} or lined with it, or decontaminate the part "
+        "after peening (no source read)"
+    )
 
 
 def hardness_in_words(part: str, shot: str) -> str:

@@ -20,7 +20,7 @@ from chamberopt.chamber.layout.balls import fit_sizes, propose_ball, sizes_to_tr
 from chamberopt.chamber.layout.end import Shape, cut_shape, root_out, strip
 from chamberopt.chamber.layout.floor import SEVERAL, Floor
 from chamberopt.chamber.layout.pose import AT_SIDE, Turns, pose_by_size, pose_in_words
-from chamberopt.chamber.layout.shot_material import choose_shot, hardness_in_words
+from chamberopt.chamber.layout.shot_material import choose_shot, hardness_in_words, iron_of_walls
 from chamberopt.chamber.layout.target import Surface, Target
 from chamberopt.chamber.layout.turning import RPM, Spindle, turning_bore, turning_pose
 from chamberopt.chamber.part import Part, posed_part
@@ -284,7 +284,8 @@ def _set_up(given: Given, stance: Stance) -> _Setup:
         + hardness_in_words(given.alloy, shot)
         if wanted.alloy
         else "ALLOY NOT KNOWN, a guess: chamberopt materials lists alloys",
-        "materials.wall": "hardened, as soft walls slow the balls; give yours",
+        "materials.wall": "hardened, as soft walls slow the balls; give yours"
+        + (f"; {iron}" if (iron := iron_of_walls(given.alloy, WALL)) else ""),
         "effects.friction": "mu of these balls on these metals, dry: chamberopt materials",
         "effects.roughness": "rms slope of faces that shot has dented",
         "process.treatment_time_s": f"{START}: the report has coverage over time",

@@ -152,8 +152,8 @@ def _of_larger(
     served, most = possible.served[chosen.ball_mm], possible.served[small]
     loses = most - served > AS_GOOD
     return (
-        f"{LARGER if loses else LARGER.lower()}: they serve {served:.0%} of the target, and "
-        f"{small:g} mm would serve {most:.0%}, with about {plain(best, 2)} mmA (--ball-mm "
+        f"{LARGER if loses else LARGER.lower()}: they suit {served:.0%} of the target, and "
+        f"{small:g} mm would suit {most:.0%}, with about {plain(best, 2)} mmA (--ball-mm "
         f"{small:g} takes these)"
     )
 
@@ -307,9 +307,11 @@ def larger_instead(
             and ratio <= AS_QUICK
         ):
             reason = (
-                f"FEWER BALLS: {kept}, serve {other.served:.0%} and cover it about as soon by "
-                f"pilots as {count:,} of {here.ball_mm:g} mm, which serve {fit.served:.0%} "
-                f"(--ball-mm {here.ball_mm:g} takes these)"
+                f"FEWER BALLS, decide: these, {its_count:,} of {there.ball_mm:g} mm, are easier to "
+                f"weigh and sort, {kept.removeprefix('these ')}, suit {other.served:.0%} and cover "
+                f"it about as soon by pilots as {count:,} of {here.ball_mm:g} mm. Keep them unless "
+                f"what lies in narrow slots and fillets, where these suit {fit.served:.0%}, is to "
+                f"be peened as soon as the rest: then --ball-mm {here.ball_mm:g}"
             )
         else:
             continue

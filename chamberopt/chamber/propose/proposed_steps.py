@@ -251,7 +251,7 @@ def with_finer_balls(
     if found is None or found.intensity is None:
         return None, "no pilot resolved the coarse balls"
     if finer_mm >= coarse_mm:
-        return None, "no smaller balls serve more"
+        return None, "no smaller balls suit more"
     try:
         finer = _with_shot(coarse, finer_mm)
         fine, most = fit_sizes(finer.chamber.part, [1e-3 * finer_mm, 1e-3 * coarse_mm])
@@ -259,9 +259,9 @@ def with_finer_balls(
         for_fillets = fine.fillets > most.fillets + MISSED_FILLETS
         gain = fine.served - most.served
         if most.served < MOSTLY:
-            return None, f"the larger ones serve too little ({shares})"
+            return None, f"the larger ones suit too little ({shares})"
         if not (gain > AS_GOOD or for_fillets):
-            return None, f"the smaller ones serve hardly more ({shares})"
+            return None, f"the smaller ones suit hardly more ({shares})"
         for balls in RAISED:  # a ceiling that suits the coarse balls may hold the finer ones
             if _jams_more(finer, coarse):
                 coarse = _raised(coarse, balls * finer_mm)
@@ -290,7 +290,7 @@ def with_finer_balls(
     reason = (
         f"{coarse_mm:g} mm balls for {first}, then {finer_mm:g} mm for {second}{turned}: the first "
         f"for the intensity, about {plain(found.intensity.value, 2)} mmA on the {most.served:.0%} "
-        f"of the target that they serve; the second, {count:,} balls ({mass_g:g} g){weaker} for "
+        f"of the target that they suit; the second, {count:,} balls ({mass_g:g} g){weaker} for "
         f"narrow places: they serve {fine.served:.0%}; each until it has covered by itself what it "
         "touches; TWO INTENSITIES: narrow places get that of the finer balls alone: agree on it, "
         f"or take one size (--ball-mm {finer_mm:g} or {coarse_mm:g})"

@@ -126,7 +126,7 @@ def _many_balls(proposal: Proposal) -> Iterator[str]:
     )
     if count > MANY:
         fewer = (one for one in proposal.trials if 1e-3 * one.ball_mm > size and one.count < count)
-        larger = [f": {one.ball_mm:g} mm would serve {one.fit.served:.0%}" for one in fewer]
+        larger = [f": {one.ball_mm:g} mm would suit {one.fit.served:.0%}" for one in fewer]
         yield f"MANY BALLS, {count:,}, to be dosed and sorted{''.join(larger[:1])}"
 
 

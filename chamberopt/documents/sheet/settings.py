@@ -11,9 +11,10 @@ import numpy as np
 
 from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.layout.pose import axis_down
+from chamberopt.chamber.layout.shot_material import iron_of_walls
 from chamberopt.common.key_words import in_words
 from chamberopt.design.fixture import joint_in_words, slit_in_words, slit_mm
-from chamberopt.design.materials import alloys, find
+from chamberopt.design.materials import alloys, balls, find
 from chamberopt.design.tolerances import tolerance_box
 from chamberopt.documents.answer import answer_lines
 from chamberopt.documents.sheet.openings import (
@@ -208,6 +209,8 @@ def chamber_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
             else:
                 rows.append((name, with_limits(result, f"chamber.{key}", text)))
     yield from first_rows(rows, "numbers", MOST_KEYS)
+    if iron := iron_of_walls(result.design.materials.part.alloy or "", wall or ""):
+        yield "iron", for_the_shop(iron)
     yield "opened at", lid_in_words(built)
     for what, several in counted.items():
         if several:
@@ -255,9 +258,15 @@ def sonotrode_rows(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
 
 def shot_rows(result: Result) -> Iterator[Row]:
     shot = result.design.shot
+    sold = find(shot.material, balls())
+    hard = ""
+    if sold and sold.hardness_HB:  # above 650 it is Vickers'
+        hard = f"; usual {plain(sold.hardness_HB)} {'HB' if sold.hardness_HB <= 650.0 else 'HV'}"
+    state = f", {sold.condition.partition(';')[0]}" if sold else ""
     yield (
         "material",
-        f"{(shot.material or 'not named').replace('_', ' ')}, {plain(shot.density)} kg/m³",
+        f"{(shot.material or 'not named').replace('_', ' ')}{state}, {plain(shot.density)} kg/m³; "
+        f"hardness and grade of your lot are not stated{hard}",
     )
     several, sizes = len(shot.sizes) > 1, []
     for diameter, count in shot.sizes:

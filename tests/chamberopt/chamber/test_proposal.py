@@ -13,7 +13,7 @@ from shapely import Polygon
 
 from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.layout.pose import pose_in_words
-from chamberopt.chamber.layout.shot_material import choose_shot
+from chamberopt.chamber.layout.shot_material import choose_shot, iron_of_walls
 from chamberopt.chamber.layout.sizes import Sizes
 from chamberopt.chamber.layout.target import Surface, propose_target, surfaces
 from chamberopt.chamber.part import chosen_triangles
@@ -226,6 +226,20 @@ def test_balls_are_harder_than_the_part(wanted: str, part: str, stock: str, mate
 def test_steel_balls_leave_iron_on_what_rusts_or_is_implanted(part: str) -> None:
     assert "LEAVES IRON" in choose_shot("steel", part, usual_shop())[1]
     assert not choose_shot("zirconia", part, usual_shop())[1]
+
+
+@pytest.mark.parametrize(
+    ("part", "walls", "is_told"),
+    [
+        ("Ti-6Al-4V", "100Cr6", True), ("7075-T6", "100Cr6", True), ("316L", "100Cr6", True),
+        ("316L", "AISI 304", False), ("Ti-6Al-4V", "7075-T6", False), ("S355", "100Cr6", False),
+        ("", "100Cr6", False), ("Ti-6Al-4V", "", False),
+    ],
+)  # fmt: skip
+def test_walls_of_steel_beside_a_metal_that_iron_spoils_are_told(
+    part: str, walls: str, is_told: bool
+) -> None:
+    assert iron_of_walls(part, walls).startswith("IRON FROM THE WALLS") is is_told
 
 
 def test_what_faces_away_is_offered_for_leaving_out(

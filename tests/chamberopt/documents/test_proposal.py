@@ -66,7 +66,7 @@ def test_balls_that_are_many_are_told_with_what_pilots_say_of_larger_ones(made: 
     fit = SizeFit(1e-3 * ball + 1e-3, 0.99, 0.83, True, 0.0, 100)
     fewer = BallTrial(ball + 1.0, 40.0, 900, 1, fit, 95.0, True, None, "")
     others = (replace(fewer, ball_mm=ball), replace(fewer, ball_mm=ball + 0.5, count=6000), fewer)
-    for trials, more in (((), ""), (others, f": {ball + 1:g} mm would serve 83%")):
+    for trials, more in (((), ""), (others, f": {ball + 1:g} mm would suit 83%")):
         matters = proposal_in_words(replace(many, trials=trials), []).matters
         told = next(one.text for one in matters if one.mark == "MANY BALLS")
         count = many.design.shot.count
@@ -135,7 +135,7 @@ def test_verbose_has_every_reason_and_every_surface(made: Proposal) -> None:
     [
         ("", [], []),
         ("half a layer", ["half a layer"], []),
-        ("serves all; BALLS JAM in gaps; 2 mm", ["serves all", "2 mm"], ["BALLS JAM in gaps"]),
+        ("suits all; BALLS JAM in gaps; 2 mm", ["suits all", "2 mm"], ["BALLS JAM in gaps"]),
         ("SAE AMS 2430 says", ["SAE AMS 2430 says"], []),
         ("LONG: turn it", [], ["LONG: turn it"]),
         ("TURNED BY A DRIVE, at 60 rpm", [], ["TURNED BY A DRIVE, at 60 rpm"]),

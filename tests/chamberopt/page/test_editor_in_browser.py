@@ -554,7 +554,7 @@ def test_shape_and_holder_are_chosen_in_words(opened: Page) -> None:
 def test_what_is_settled_is_taken_out_of_the_file(opened: Page) -> None:
     page, file = opened.page, opened.served.folder / "design.toml"
     text = file.read_text()
-    many = "MANY BALLS, 5,200, to be dosed and sorted: 2.5 mm would serve 80%"
+    many = "MANY BALLS, 5,200, to be dosed and sorted: 2.5 mm would suit 80%"
     file.write_text(f'to_settle = [\n  "{many}",\n  "NOT MASKED: ask",\n]\n{text}')
     page.click("#reload")
     listed = page.locator("#settle li")

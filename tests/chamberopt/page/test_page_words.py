@@ -20,8 +20,8 @@ from chamberopt.page.page_words import (
 @pytest.mark.parametrize(
     ("matter", "balls", "amplitudes"),
     [
-        ("MANY BALLS, to be dosed and sorted: 0.7 mm would serve 80%", [0.7], []),
-        ("LARGER BALLS: they serve 60%, and 1 mm would serve 90%, with about 0.2 mmA "
+        ("MANY BALLS, to be dosed and sorted: 0.7 mm would suit 80%", [0.7], []),
+        ("LARGER BALLS: they suit 60%, and 1 mm would suit 90%, with about 0.2 mmA "
          "(--ball-mm 1 takes these)", [1.0], []),
         ("NOT IN THE RANGE: it takes an amplitude of about 55 µm zero-to-peak, or balls of about "
          "1.3 mm, larger than are proposed here", [1.3], [55.0]),

@@ -81,28 +81,28 @@ def test_the_report_says_the_range_beside_the_interval(folder: Path) -> None:
     document = report(load_result(folder))
     (line,) = [one.text for one in document.answer_lines if one.about == "ranges"]
     assert line.startswith(
-        "Not calibrated: the yield speed (0.5 to 2 times). Over their ranges the mean coverage of "
+        "Not calibrated: the least speed that dents (0.5 to 2 times). Over their ranges the mean coverage of "
         "the target is "
     )
     assert line.endswith(
-        " %; what would narrow it most is the yield speed (100 % of it), by ball drops at 3 m/s "
+        " %; what would narrow it most is the least speed that dents (100 % of it), by ball drops at 3 m/s "
         "on each surface (chamberopt calibrate)."
     )
     sections = {one.title: one for one in document.sections}
     assert sections["Coverage"].content[0].head[-1] == "range"
     figures, folded, named = sections["What is not calibrated"].content[1:4]
     (ends,) = folded.content
-    assert ends.caption == "Changes by the yield speed, ± 95 % noise of its runs"
+    assert ends.caption == "Changes by the least speed that dents, ± 95 % noise of its runs"
     assert ends.head == ("", "at the low end", "at the high end")
     row = dict((one[0], one) for one in figures.rows)["mean exposure, in times to 98 % coverage"]
     low, high = (float(one) for one in row[2].split(" to "))
     assert (low, high) == pytest.approx((0.5 * 2.0 * low, 4.0 * low), rel=0.1)
-    assert row[3] == "the yield speed 100 %"
+    assert row[3] == "the least speed that dents 100 %"
     numbers = {one[0]: one[1:] for one in named.rows}
     assert ("0.44", "0.22", "0.88") in numbers.values()
     assert not any("." in name.split(" [")[0] for name in numbers)  # words, no keys
     assert (
-        "The ranges hold what is not calibrated: the yield speed."
+        "The ranges hold what is not calibrated: the least speed that dents."
         in sections["The answer"].content[-1].text
     )
 
@@ -129,7 +129,7 @@ def test_the_sheet_says_the_time_at_the_slow_end(folder: Path) -> None:
     planned = result.design.changed({"process.treatment_time_s": 1.5 * time.value})
     there = [text for text in cautions(replace(result, design=planned)) if "slow end" in text]
     assert there == [
-        "It is not enough at the slow end of what is not calibrated (the yield speed): there 95 % "
+        "It is not enough at the slow end of what is not calibrated (the least speed that dents): there 95 % "
         f"of the target's area is 98 % covered after {text}."
     ]
     ample = result.design.changed({"process.treatment_time_s": 3.0 * time.value})
@@ -205,7 +205,7 @@ def test_a_study_says_whether_its_best_stays_best(
     found = study_ranges(result, SerialExecutor(), teller)
     assert found is not None
     assert told[0].startswith(
-        "the yield speed: not calibrated, so 4 more replicas of each of 2 designs are "
+        "the least speed that dents: not calibrated, so 4 more replicas of each of 2 designs are "
     )
     (rival,) = found.rivals
     assert (rival.rival, len(rival.gains)) == ("start", 2)
@@ -216,7 +216,9 @@ def test_a_study_says_whether_its_best_stays_best(
     read = load_result(tmp_path)
     assert read.study.at_ends == [rival]
     assert load_result(tmp_path / "start").record.ranges == found.start
-    sentence = "The best design stays better than the start at both ends of the yield speed."
+    sentence = (
+        "The best design stays better than the start at both ends of the least speed that dents."
+    )
     assert sentence in [one.text for one in report(read).answer_lines]
     said = result_end(tmp_path, verbose=False)
     assert sentence in said

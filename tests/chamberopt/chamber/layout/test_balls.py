@@ -134,7 +134,7 @@ def test_fewer_balls_are_proposed_where_they_serve_nearly_as_much() -> None:
     others = [SizeFit(1e-3, 1.0, 0.97, False, 0.0, 1000), SizeFit(2e-3, 1.0, 0.6, False, 0.0, 250)]
     diameter, reason = propose_ball([small, *others])
     assert diameter == 1e-3
-    assert "0.5 mm would serve 100%, but take 4 times as many" in reason
+    assert "0.5 mm would suit 100%, but take 4 times as many" in reason
     assert propose_ball([small, others[1]])[0] == 0.5e-3
 
 
@@ -184,7 +184,7 @@ def test_a_gap_may_be_off_by_its_tolerance(width_mm: float, nearly: bool) -> Non
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 @pytest.mark.parametrize(
     ("served", "chosen", "said"),
-    [(0.80, 1.5, "0.5 mm may jam in a gap of"), (0.60, 0.5, "which serve 60%")],
+    [(0.80, 1.5, "0.5 mm may jam in a gap of"), (0.60, 0.5, "which suit 60%")],
 )
 def test_a_size_that_may_jam_gives_way_to_one_that_serves_nearly_as_much(
     served: float, chosen: float, said: str, scale: float

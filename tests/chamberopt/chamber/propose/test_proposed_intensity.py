@@ -36,7 +36,7 @@ from chamberopt.chamber.propose.proposed_setting import (
     setting_of,
     settings_of,
 )
-from chamberopt.chamber.propose.text import design_text, study_texts
+from chamberopt.chamber.propose.text import clauses, design_text, study_texts
 from chamberopt.chamber.shop import Shop, load_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
@@ -200,7 +200,7 @@ def test_larger_balls_that_serve_most_are_taken_only_for_the_intensity(
     )
     assert setting_of(made).ball_mm == ball_mm
     reason = made.reasons["shot.diameter_mm"]
-    told = "they serve 85% of the target, and 1 mm would serve 97%, with about 0.08 mmA"
+    told = "they suit 85% of the target, and 1 mm would suit 97%, with about 0.08 mmA"
     assert (told in reason) == (ball_mm == 1.5)
 
 
@@ -479,7 +479,11 @@ def test_larger_balls_are_taken_that_give_the_intensity_and_are_no_slower(
     assert taken is not None
     assert taken.made.design == larger.design
     reason = taken.made.reasons["shot.diameter_mm"]
-    assert reason.startswith("FEWER BALLS: these touch 100% of the target, serve 100% and cover")
+    assert reason.startswith("FEWER BALLS, decide: these, ")
+    assert "touch 100% of the target, suit 100% and cover it about as soon" in reason
+    why, (settle,) = clauses(reason)
+    assert not why
+    assert settle.endswith("as the rest: then --ball-mm 1")
     assert "about as soon by pilots as 4,000 of 1 mm" in reason
     slow = good._replace(found=pilot_of(0.12, 700.0))
     assert larger_instead(enough._replace(made=many), [slow], trials, asked) is None

@@ -48,7 +48,7 @@ def test_each_size_peens_for_its_own_time_in_one_chamber(coarse: Proposal, tmp_p
         seen.append(one)
         return pilot(300.0, 0.1)
 
-    reasons = {**coarse.reasons, "shot.diameter_mm": f"{LARGER}: they serve 83%"}
+    reasons = {**coarse.reasons, "shot.diameter_mm": f"{LARGER}: they suit 83%"}
     larger = replace(coarse, reasons=reasons)
     two, why = with_finer_balls(larger, pilot(600.0, 0.3), FINER, measure)
     assert two is not None, why
@@ -83,7 +83,7 @@ def test_each_size_peens_for_its_own_time_in_one_chamber(coarse: Proposal, tmp_p
     [
         (None, FINER, "no pilot resolved the coarse balls"),
         (pilot(600.0, 0.3), COARSE, "no smaller ball"),
-        (pilot(600.0, 0.3), 2.5, "the smaller ones serve hardly more"),  # large beside the slot
+        (pilot(600.0, 0.3), 2.5, "the smaller ones suit hardly more"),  # large beside the slot
     ],
 )
 def test_one_size_stays_where_finer_ones_bring_nothing(
