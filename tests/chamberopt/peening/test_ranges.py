@@ -168,14 +168,14 @@ def test_the_best_of_a_study_is_ranked_at_both_ends() -> None:
     stays = best_at_ends(replace(best, ends=better), rival, "start")
     assert all(x.gain.value == pytest.approx(0.1) for x in stays.gains)
     assert at_ends_text(stays) == (
-        "The best design stays better than the start at both ends of friction, the least speed that dents "
-        "and slopes of the faces."
+        "The best design stays better than the start at both ends of friction, the least speed "
+        "that dents and slopes of the faces."
     )
     ends = better | {"v0": (better["v0"][0], rival.ends["friction"][1])}
     text = at_ends_text(best_at_ends(replace(best, ends=ends), rival, "runner-up"))
     assert (
-        "the runner-up is better at the high end of the least speed that dents; the best design is better at"
-        in text
+        "the runner-up is better at the high end of the least speed that dents; the best design "
+        "is better at" in text
     )
     assert "Noise hides" in at_ends_text(best_at_ends(best, rival, "start"))
 

@@ -81,12 +81,12 @@ def test_the_report_says_the_range_beside_the_interval(folder: Path) -> None:
     document = report(load_result(folder))
     (line,) = [one.text for one in document.answer_lines if one.about == "ranges"]
     assert line.startswith(
-        "Not calibrated: the least speed that dents (0.5 to 2 times). Over their ranges the mean coverage of "
-        "the target is "
+        "Not calibrated: the least speed that dents (0.5 to 2 times). Over their ranges the mean "
+        "coverage of the target is "
     )
     assert line.endswith(
-        " %; what would narrow it most is the least speed that dents (100 % of it), by ball drops at 3 m/s "
-        "on each surface (chamberopt calibrate)."
+        " %; what would narrow it most is the least speed that dents (100 % of it), by ball drops "
+        "at 3 m/s on each surface (chamberopt calibrate)."
     )
     sections = {one.title: one for one in document.sections}
     assert sections["Coverage"].content[0].head[-1] == "range"
@@ -129,8 +129,8 @@ def test_the_sheet_says_the_time_at_the_slow_end(folder: Path) -> None:
     planned = result.design.changed({"process.treatment_time_s": 1.5 * time.value})
     there = [text for text in cautions(replace(result, design=planned)) if "slow end" in text]
     assert there == [
-        "It is not enough at the slow end of what is not calibrated (the least speed that dents): there 95 % "
-        f"of the target's area is 98 % covered after {text}."
+        "It is not enough at the slow end of what is not calibrated (the least speed that dents): there "
+        f"95 % of the target's area is 98 % covered after {text}."
     ]
     ample = result.design.changed({"process.treatment_time_s": 3.0 * time.value})
     assert not [one for one in cautions(replace(result, design=ample)) if "slow end" in one]
