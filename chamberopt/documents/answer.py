@@ -36,12 +36,15 @@ def answer_in(folder: Path) -> str:
     return answer(result, load_start(result))
 
 
-def answer(result: Result, start: Result | None) -> str:
+def answer(result: Result, start: Result | None, tells_aim: bool = True) -> str:
     """Return the answer of a result in one sentence, with its uncertainty.
 
     For a study, the sentence gives the objective of the start design and of the best design, and
     whether the change is useful, and more than noise. For a simulation, the sentence gives the
     coverage.
+
+    Args:
+        tells_aim: also what a search would be after, where it is not the mean coverage.
     """
     label = objective_label(result.objective_name)
     if start is None:
@@ -64,7 +67,7 @@ def answer(result: Result, start: Result | None) -> str:
             f"After {plain(treatment_time)} s the target is covered to "
             f"{mean.format(result.metrics['mean_coverage'])} on average"
         )
-        if label.text != mean.text:
+        if tells_aim and label.text != mean.text:
             text += f", and its {label.in_full} is {label.format(result.objective)}"
         return f"{text} (95 % intervals); {full_coverage(result)}."
     named = label.in_full

@@ -29,8 +29,6 @@ SHARP_EDGE = 30  # degrees between the triangles at an edge that is drawn
 ROUND_STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # of colour bars, times powers of ten
 LIFT = 0.1  # height of discs over the surface, in radii, so that facets of an edge hide no disc
 DISC_SIDES = 24
-NUMBER_SIZE = 22  # pixels
-NUMBER_LIFT = 0.01  # height of a number over the surface, over the part's size
 SCATTER = "counted dents scatter: single places look less even than they are"
 NO_RENDER = {"render": False, "reset_camera": False}  # while actors are added to the plotter
 
@@ -99,22 +97,6 @@ def add_part(
     for actor in actors:
         actor.prop.interpolation = "Phong"  # by the normals at the vertices
     return actors
-
-
-def add_numbers(plotter: Any, marks: np.ndarray, size: float) -> None:
-    """Add the numbers of places to a plotter, from 1 on; what hides a place hides its number.
-
-    Args:
-        marks: the places [mm] and the normals there, (n, 6).
-        size: of the part [mm].
-    """
-    if len(marks):
-        plotter.add_point_labels(
-            marks[:, :3] + NUMBER_LIFT * size * marks[:, 3:],
-            [str(number) for number in range(1, len(marks) + 1)],
-            font_size=NUMBER_SIZE, bold=True, text_color=DARK, shape_color=BACKGROUND,
-            shape_opacity=0.85, show_points=False, always_visible=False, render=False,
-        )  # fmt: skip
 
 
 def _add_zones(plotter: Any, part: DrawnPart) -> list[Any]:

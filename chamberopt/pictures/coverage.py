@@ -8,17 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.pictures.actors import (
-    SCATTER,
-    add_edges,
-    add_numbers,
-    add_part,
-    body_meanings,
-    colour_meanings,
-)
+from chamberopt.pictures.actors import SCATTER, add_edges, add_part, body_meanings, colour_meanings
 from chamberopt.pictures.camera import target_in_chamber
 from chamberopt.pictures.drawn_part import DrawnPart, beyond, colour_range
-from chamberopt.pictures.panels import choose_views, part_panels
+from chamberopt.pictures.panels import choose_views, part_panels, seen_marks
 from chamberopt.pictures.picture_page import ColourBar, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess
 from chamberopt.results.arrays_file import ARRAYS_FILE, read_result_arrays
@@ -74,9 +67,12 @@ def render_coverage(job: dict[str, Any]) -> None:
         def add(plotter: Any, part: DrawnPart = part) -> None:
             add_part(plotter, part, limits)
             add_edges(plotter, part.surface)
-            add_numbers(plotter, np.reshape(job["marks"], (-1, 6)), part.surface.length)
 
-        panels = part_panels(add, part.inside, part.surface, chamber, views)
+        marks = np.reshape(job["marks"], (-1, 6))
+        panels = [
+            one._replace(marks=seen_marks(marks, part.surface, one.view.frame[2]))
+            for one in part_panels(add, part.inside, part.surface, chamber, views)
+        ]
         for first in range(0, len(panels), job["columns"]):
             shown = panels[first : first + job["columns"]]
             rows.append(Row("" if first else title, shown))

@@ -18,7 +18,7 @@ from chamberopt.pictures.camera import (
     seen_area,
     view_frame,
 )
-from chamberopt.pictures.picture_page import Dimension, Panel
+from chamberopt.pictures.picture_page import Dimension, Mark, Panel
 from chamberopt.pictures.view import render_view
 from chamberopt.results.vtp_files import Surface
 
@@ -32,6 +32,7 @@ BORDER, BORDER_OF_CHAMBER = 25, 95  # pixels; the larger one has room for dimens
 WHOLE = 1.3  # longest part that is shown whole, over the length of its target
 NEAR_CAPTIONS = "the target", "what is hidden there"
 ALIKE_CAPTION = "the target, alike from the other side"
+ABOVE = 1e-3  # height over the surface from which a place is looked for, over the part's size
 ALIKE = 3.0  # mean difference of two images, of 255, up to which they show the same
 
 Add = Callable[[Any], None]
@@ -120,6 +121,23 @@ def near_panels(
         Panel(render_view(add, eye, points, SIZE, BORDER), caption, is_cut=is_cut)
         for eye, caption in zip(eyes, NEAR_CAPTIONS, strict=False)
     ]
+
+
+def seen_marks(marks: np.ndarray, part: Surface, eye: np.ndarray) -> list[Mark]:
+    """Return the places that are seen on a part, each with its number, from 1 on.
+
+    Args:
+        marks: places [mm] and the normals there, (n, 6).
+        eye: direction to the eye.
+    """
+    size, found = float(part.length), []
+    for number, one in enumerate(marks, 1):
+        place, normal = one[:3], one[3:]
+        start = place + ABOVE * size * normal
+        hits = part.ray_trace(start, start + 2.0 * size * eye, first_point=True)[0]
+        if normal @ eye > 0.0 and not len(hits):
+            found.append(Mark(place, str(number)))
+    return found
 
 
 def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:

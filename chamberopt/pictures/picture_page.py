@@ -47,6 +47,13 @@ class Dimension(NamedTuple):
     row: int = 0
 
 
+class Mark(NamedTuple):
+    """A text to write at a place [mm], (3,)."""
+
+    place: np.ndarray
+    text: str
+
+
 class Panel(NamedTuple):
     """A view with its caption.
 
@@ -56,6 +63,7 @@ class Panel(NamedTuple):
         dimensions: lengths to draw round the points `outside`.
         outside: points [mm], (k, 3), that no dimension may cross.
         is_cut: true if the part reaches beyond the view, which then has a frame.
+        marks: texts to write on the view.
     """
 
     view: View
@@ -63,6 +71,7 @@ class Panel(NamedTuple):
     dimensions: Sequence[Dimension] = ()
     outside: np.ndarray | None = None
     is_cut: bool = False
+    marks: Sequence[Mark] = ()
 
 
 class ColourBar(NamedTuple):
@@ -156,6 +165,10 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     axes.set_title(literal(panel.caption), loc="left", fontsize=TEXT)
     for one in panel.dimensions:
         _draw_dimension(axes, panel, one)
+    for mark in panel.marks:
+        x, y = panel.view.pixels(mark.place[None])[0]
+        axes.text(x, y, mark.text, fontsize=TEXT, ha="center", va="center", weight="bold",
+                  bbox={"boxstyle": "circle,pad=0.2", "fc": "white", "ec": "black"})  # fmt: skip
     _draw_triad(axes, panel.view.frame, (36.0, rows + 42.0))
     draw_scale(axes, panel.view, (100.0, rows + 34.0))
 

@@ -237,8 +237,8 @@ def _said_of_treatment(found: Measured, treatment: float, coverage_percent: floa
         long += (
             f"; {OF_TIME[1]} for single places, at least {rounded(found.time_to_98, 2)} s: "
             "simulate before it is set. Without that, peen so long, look at the least open "
-            "places (such as roots) through a magnifier of 10 to 30 times, and go on, for twice as long each "
-            "time, until no more dents are seen"
+            "places (such as roots) through a magnifier of 10 to 30 times, and go on, for twice as "
+            "long each time, until no more dents are seen"
         )
     wanted = ""
     if coverage_percent is not None:

@@ -86,7 +86,8 @@ def _first_part(result: Result, built: AsBuilt) -> str:
     return (
         f"stop it after {plain(after, 2)} s{f', {what},' if what else ''} and look: dents are "
         f"expected on about {told}{more}. Where fewer are seen, the machine peens more slowly than "
-        "was simulated, and the peening time is to be found as of a time that is not set."
+        "was simulated: peen on, twice as long each time, until no more dents are seen, and set "
+        "that time."
     )
 
 

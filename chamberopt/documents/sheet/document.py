@@ -76,7 +76,7 @@ def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Documen
     return Document(
         name,
         f"{SHEETS_OF[record.kind]}; simulated {record.created[:10]}",
-        answer(result, start),
+        answer(result, start, tells_aim=False),
         (),
         [
             Section("Process sheet", content),

@@ -6,6 +6,8 @@ import numpy as np
 from matplotlib.image import imread
 
 from chamberopt.pictures.coverage import draw_coverage
+from chamberopt.pictures.panels import seen_marks
+from chamberopt.results.vtp_files import pyvista
 from tests.helpers.opengl import needs_opengl
 
 
@@ -34,3 +36,18 @@ def test_one_below_the_other(case: tuple, tmp_path: Path) -> None:
     upper, lower = near[: len(near) // 2], near[len(near) // 2 :]
     amounts = [((half > 0.97).all(axis=2)).mean() for half in (upper, lower)]
     assert abs(amounts[0] - amounts[1]) < 0.1  # the same part on the same scale
+
+
+def test_numbers_stand_where_their_places_are_seen() -> None:
+    """Of a table, the top is seen from above, and under it the foot from the side alone."""
+    top = pyvista().Box((-10.0, 10.0, -10.0, 10.0, 8.0, 10.0)).triangulate()
+    table = top + pyvista().Box((-2.0, 2.0, -2.0, 2.0, 0.0, 8.0)).triangulate()
+    marks = np.array([[0.0, 5.0, 10.0, 0.0, 0.0, 1.0], [2.0, 0.5, 4.0, 1.0, 0.0, 0.0]])
+    seen = {
+        way: [one.text for one in seen_marks(marks, table, np.array(eye))]
+        for way, eye in {
+            "above": (0.0, 0.0, 1.0), "side": (1.0, 0.0, 0.0), "steep": (0.3, 0.0, 0.95),
+            "below": (0.0, 0.0, -1.0),
+        }.items()
+    }  # fmt: skip
+    assert seen == {"above": ["1"], "side": ["2"], "steep": ["1"], "below": []}

@@ -129,8 +129,8 @@ def test_the_sheet_says_the_time_at_the_slow_end(folder: Path) -> None:
     planned = result.design.changed({"process.treatment_time_s": 1.5 * time.value})
     there = [text for text in cautions(replace(result, design=planned)) if "slow end" in text]
     assert there == [
-        "It is not enough at the slow end of what is not calibrated (the least speed that dents): there "
-        f"95 % of the target's area is 98 % covered after {text}."
+        "It is not enough at the slow end of what is not calibrated (the least speed that dents): "
+        f"there 95 % of the target's area is 98 % covered after {text}."
     ]
     ample = result.design.changed({"process.treatment_time_s": 3.0 * time.value})
     assert not [one for one in cautions(replace(result, design=ample)) if "slow end" in one]
