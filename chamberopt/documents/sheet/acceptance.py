@@ -47,7 +47,7 @@ def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         yield "places to look at", f"all of the target, by {LENS}: too few dents tell places apart"
     seen = f"each of places 1 to {len(places)}" if len(places) > 1 else "the target"
     missed = 1.0 - result.record.field.reachable_share
-    but = f", but {missed_text(missed)} that no ball can touch (see Warnings)"
+    but = f", but the {per_cent(missed)} that no ball can touch (see Warnings)"
     yield (
         "ACCEPT or REJECT",
         f"ACCEPT coverage if dents lie on {per_cent(COVERED)} or more of {seen}, and nothing else "
@@ -55,11 +55,6 @@ def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         "the same time once more and look again; REJECT it if it is still less.",
     )
     yield "intensity", _intensity(result, built)
-
-
-def missed_text(missed: float) -> str:
-    """Return a share of the target that no ball can touch in words."""
-    return f"the {per_cent(missed)}" if missed >= LEAST_MISSED else "less than 1 %"
 
 
 def _first_part(result: Result, built: AsBuilt) -> str:
@@ -107,7 +102,7 @@ def _intensity(result: Result, built: AsBuilt) -> str:
         return f"{not_by_dents}: no lid takes a strip here; {COUPON}"
     level = "" if built.level_mm is None else f" {built.level_mm} mm from the sonotrode"
     return (
-        f"{not_by_dents}, and no whole strip fits. The largest: {room.in_words}, flush in a steel "
+        f"{not_by_dents}; no whole strip fits, the largest is {room.in_words}, flush in a steel "
         f"lid{level} in the place of the part, held at its edges. Its arc heights are no mmA: they "
-        f"ACCEPT that a set-up peens as an approved one did, not a first one. Or {COUPON}"
+        f"ACCEPT a set-up that peens as an approved one did, but no first one. Or {COUPON}"
     )
