@@ -13,7 +13,8 @@ import numpy as np
 from chamberopt.chamber.thin_part import thickness_to_simulate
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
-from chamberopt.geometry.cut import cut_at_box
+from chamberopt.geometry.cut import cut_at_box, cut_at_distance
+from chamberopt.geometry.face_shapes import beside_toes
 from chamberopt.geometry.faces import Border, Faces
 from chamberopt.geometry.heights import lowest_over
 from chamberopt.geometry.meshes.part_mesh import (
@@ -345,8 +346,8 @@ class PartPreview:
 def preview_part(design: Design) -> PartPreview:
     """Return the part, its target and its zones on the triangles of the file, for a quick view.
 
-    In contrast to `posed_part`, curved surfaces are not divided, and target.element_mm has no
-    effect, which saves time.
+    In contrast to `posed_part`, curved surfaces are not divided, and target.element_mm and
+    target.beside_mm have no effect, which saves time.
 
     Raises:
         InputError: the file cannot be used, or target or zone are empty.
@@ -475,24 +476,63 @@ def _simulated(
             text = "the part is drawn with its chamber, and its triangles are not divided"
             raise InputError(f"part.target.cut: {text}; leave it out")
         found = _cut(found, target.box_mm)
+    if target.beside_mm is not None:
+        if is_wall:
+            text = "the part is drawn with its chamber, and its triangles are not divided"
+            raise InputError(f"part.target.beside_mm: {text}; leave it out")
+        found = _with_beside(found, 1e-3 * target.beside_mm)
     size = target.element
     return found if size is None else _remeshed(found, size)
 
 
 def _cut(found: _Simulated, box_mm: Box) -> _Simulated:
     """Return the part with the triangles of its target divided at a box, which narrows it."""
+    box = 1e-3 * np.asarray(box_mm)
+    cut = _divided(found, cut_at_box(_surface_of(found), box, found.target))
+    return cut._replace(target=cut.target & _in_box(cut.mesh, box_mm))
+
+
+def _with_beside(found: _Simulated, beside: float) -> _Simulated:
+    """Return the part whose target takes what lies near on the faces beside its hollow edges.
+
+    Args:
+        beside: how near [m].
+    """
+    from sim_core import TriangleMesh, closest_points
+
+    mesh = found.mesh
+    near = beside_toes(mesh.vertices, mesh.triangles, found.target)
+    if not near.any():
+        raise InputError(
+            "part.target.beside_mm: the target meets no other face in a hollow edge; leave it out"
+        )
+    surface = TriangleMesh(mesh.vertices, mesh.triangles, found.target.astype(np.uint8))
+    far = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+
+    def distance(places: np.ndarray) -> np.ndarray:
+        return closest_points(surface, places, far, tag=1).distance
+
+    made, is_near = cut_at_distance(_surface_of(found), distance, beside)
+    cut = _divided(found, made)
+    return cut._replace(target=cut.target | (near[made.parent] & is_near))
+
+
+def _surface_of(found: _Simulated) -> Surface:
+    """Return the part as a surface whose triangles can be divided."""
     mesh, normals, count = found.mesh, found.normals, len(found.mesh.triangles)
     if normals is None:
         normals = facet_normals(mesh.vertices[mesh.triangles])
     own, of_crease = np.arange(count), np.zeros((count, 3), dtype=bool)
-    surface = Surface(mesh.vertices, mesh.triangles, own, normals, of_crease, np.zeros(count))
-    made = cut_at_box(surface, 1e-3 * np.asarray(box_mm), found.target)
+    return Surface(mesh.vertices, mesh.triangles, own, normals, of_crease, np.zeros(count))
+
+
+def _divided(found: _Simulated, made: Surface) -> _Simulated:
+    """Return the part with the triangles of a surface into which its own were divided."""
     rows = made.parent
-    mesh = mesh.divided(made.vertices, made.triangles, rows)
     return found._replace(
-        mesh=mesh,
+        mesh=found.mesh.divided(made.vertices, made.triangles, rows),
         origin=found.origin[rows],
-        target=found.target[rows] & _in_box(mesh, box_mm),
+        target=found.target[rows],
         normals=None if found.normals is None else made.normals,
         hollow=None if found.hollow is None else found.hollow[rows],
     )

@@ -156,6 +156,14 @@ class Target(Selection):
         default=False,
         description="divide the triangles that cross a side of box_mm, so that it ends straight",
     )
+    beside_mm: float | None = quantity(
+        0.1,
+        100,
+        "mm",
+        "also what lies so near on the faces that it meets in hollow edges, such as plates beside "
+        "the toes of a weld; absent: nothing",
+        None,
+    )
     reachable: bool = Field(
         default=False, description="only what a ball can touch, in the design's own chamber"
     )
@@ -164,6 +172,12 @@ class Target(Selection):
         yield from super()._problems()
         if self.cut and self.box_mm is None:
             yield Problem("cut", "given without box_mm; give the box at whose sides to cut")
+
+    @property
+    def in_words(self) -> str:
+        """What is chosen, by the keys that are given."""
+        beside = f"with {plain(self.beside_mm or 0.0)} mm of the faces beside its hollow edges"
+        return "; ".join(filter(None, (super().in_words, beside if self.beside_mm else "")))
 
     @property
     def element(self) -> float | None:

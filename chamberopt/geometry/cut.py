@@ -88,16 +88,47 @@ def piece_beyond(
         Vertices [m] and triangles of the piece, and the values, linear in between, of its vertices.
         There are none if all of the surface is nearer.
     """
-    surface = facets(vertices, triangles)
+    surface, beyond, values = _cut_at_level(facets(vertices, triangles), distance, least, values)
+    kept = surface.triangles[beyond[surface.triangles].mean(axis=1) > 0.0]
+    used, numbers = np.unique(kept, return_inverse=True)
+    return surface.vertices[used], numbers.reshape(-1, 3), values[used]
+
+
+def cut_at_distance(
+    surface: Surface, distance: Callable[[np.ndarray], np.ndarray], level: float
+) -> tuple[Surface, np.ndarray]:
+    """Return a surface divided at a distance from something, and marks of what is nearer, (k,).
+
+    Args:
+        distance: returns the distance of each of some places (n, 3) from that thing [m], (n,).
+        level: the distance [m].
+    """
+    cut, beyond, _ = _cut_at_level(surface, distance, level, np.empty((len(surface.vertices), 0)))
+    return cut, beyond[cut.triangles].mean(axis=1) < 0.0
+
+
+def _cut_at_level(
+    surface: Surface, distance: Callable[[np.ndarray], np.ndarray], level: float, values: np.ndarray
+) -> tuple[Surface, np.ndarray, np.ndarray]:
+    """Return a surface divided at a distance from something.
+
+    Args:
+        distance, level: those of cut_at_distance.
+        values: of each vertex, shape (n, k).
+
+    Returns:
+        The surface, how far each of its vertices is beyond the level [m], (m,), and the values,
+        linear in between, of its vertices.
+    """
     for _ in range(MOST_HALVINGS):
         ends, edge = _edges(surface.triangles)
-        beyond = distance(surface.vertices) - least
+        beyond = distance(surface.vertices) - level
         length = np.linalg.norm(np.diff(surface.vertices[ends], axis=1)[:, 0], axis=1)
         # A distance changes by no more than the way: elsewhere the level does not meet the edge.
         meets = np.abs(beyond[ends]).min(axis=1) < length
-        middle = distance(surface.vertices[ends].mean(axis=1)) - least
-        is_bent = np.abs(middle - beyond[ends].mean(axis=1)) > STRAIGHT * least
-        share = np.where(meets & is_bent & (length > FINE * least), 0.5, 0.0)
+        middle = distance(surface.vertices[ends].mean(axis=1)) - level
+        is_bent = np.abs(middle - beyond[ends].mean(axis=1)) > STRAIGHT * level
+        share = np.where(meets & is_bent & (length > FINE * level), 0.5, 0.0)
         if not share.any():
             break
         values = np.concatenate([values, _between(values, ends, share)[share > 0.0]])
@@ -108,9 +139,7 @@ def piece_beyond(
     place = _between(surface.vertices, ends, share)
     beyond = np.concatenate([beyond, np.zeros(np.count_nonzero(share))])
     surface, _ = _divided_at(surface, ends, edge, share, place)
-    kept = surface.triangles[beyond[surface.triangles].mean(axis=1) > 0.0]
-    used, numbers = np.unique(kept, return_inverse=True)
-    return surface.vertices[used], numbers.reshape(-1, 3), values[used]
+    return surface, beyond, values
 
 
 def _edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -156,6 +156,45 @@ def find_bevels(faces: Faces, vertices: np.ndarray, triangles: np.ndarray) -> np
     return np.flatnonzero(is_bevel)
 
 
+def leg_of_bevel(vertices: np.ndarray, triangles: np.ndarray, own: np.ndarray) -> float:
+    """Return the leg of bevels [m], how far they reach along their neighbours from the hidden root.
+
+    It is the mean of several, each as wide along both of its neighbours.
+
+    Args:
+        vertices, triangles: of the surface [m], (n, 3) and (m, 3).
+        own: marks the triangles of the bevels, (m,) bool.
+    """
+    sides, along, turn = _hollow_turns(vertices, triangles)
+    long = np.linalg.norm(along, axis=1) * _is_toe(sides, turn, own)
+    width = 2.0 * float(areas(vertices, triangles[own]).sum() / long.sum())
+    return 0.5 * width / math.cos(math.radians(float(np.average(turn, weights=long))))
+
+
+def beside_toes(vertices: np.ndarray, triangles: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Mark the triangles of the faces that a piece of a surface meets in hollow edges, (m,) bool.
+
+    Args:
+        vertices, triangles: of the surface [m], (n, 3) and (m, 3).
+        own: marks the piece, (m,) bool. None of it is marked.
+    """
+    sides, _, turn = _hollow_turns(vertices, triangles)
+    touching = np.unique(sides[_is_toe(sides, turn, own)] // 3)
+    faces = Faces(vertices, triangles, BEVEL_DEG[0])
+    return np.isin(faces.of_triangle, faces.of_triangle[touching]) & ~own
+
+
+def _is_toe(sides: np.ndarray, turn: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Mark pairs of sides (e,) at which a piece of a surface ends in a hollow edge.
+
+    Args:
+        sides, turn: as of _hollow_turns.
+        own: marks the piece, (m,) bool.
+    """
+    one, other = own[sides // 3].T
+    return np.asarray((one != other) & (turn > BEVEL_DEG[0]))
+
+
 def hollow_edges(vertices: np.ndarray, triangles: np.ndarray, least_deg: float) -> np.ndarray:
     """Return the ends of the sides at which a surface is hollow and sharp, (k, 2, 3) [m].
 

@@ -71,8 +71,9 @@ def iron_of_walls(part: str, walls: str) -> str:
     hard = "stainless steel" if own.stainless else "titanium or aluminium"
     return (
         f"IRON FROM THE WALLS: balls carry what they wear from {of_walls.name} onto {name}, "
-        f"whatever they are made of: walls of {hard} or lined with it, or decontaminate the part "
-        "after peening (no source read)"
+        f"whatever they are made of: walls of {hard}, or lined with it, which slow the balls more "
+        "where they are softer (materials.wall, simulate again), or decontaminate the part after "
+        "peening (no source read)"
     )
 
 

@@ -21,6 +21,7 @@ from chamberopt.geometry.face_shapes import (
     find_bevels,
     is_inside_of_tube,
     is_ring,
+    leg_of_bevel,
     teeth_of,
 )
 from chamberopt.geometry.meshes.part_mesh import PartMesh, select_triangles
@@ -88,6 +89,7 @@ class Surface:
     colour: str = ""  # colour of just these triangles in the file
     alone: str = ""  # names of each of its faces, and where they look, if they are few
     raises_stress: bool = False  # whether such a form raises stress, as fillets and welds do
+    beside_mm: float = 0.0  # what a target of it takes of the faces beside its hollow edges
 
 
 @dataclass(frozen=True)
@@ -355,7 +357,11 @@ def _bevels(mesh: PartMesh) -> list[Surface]:
     count = f"{len(own)} faces, " if len(own) > 1 else ""
     text = f"{count}{area_in_mm2(float(faces.area[own].sum()))}, in hollow corners, as fillet welds"
     marked = np.isin(faces.of_triangle, own)
-    return [Surface("bevels", {"faces": keys}, marked, text, raises_stress=True)]
+    leg_mm = 1e3 * leg_of_bevel(mesh.vertices, mesh.triangles, marked)
+    beside_mm = max(0.5 * round(2.0 * leg_mm), 0.5)
+    return [
+        Surface("bevels", {"faces": keys}, marked, text, raises_stress=True, beside_mm=beside_mm)
+    ]
 
 
 def _single(mesh: PartMesh, of: Surface, number: int) -> Surface | None:
@@ -452,6 +458,13 @@ def _joined(chosen: Sequence[Surface], reason: str) -> Target:
         text = "names of the file and faces cannot be one target; give one kind"
         raise InputError(f"--target: given {[one.name for one in chosen]}; {text}")
     marked = np.any([one.triangles for one in chosen], axis=0)
+    if beside_mm := max(one.beside_mm for one in chosen):
+        keys["beside_mm"] = beside_mm
+        reason = (
+            f"with {beside_mm:g} mm of the faces beside the toes, as wide as the leg of the weld "
+            "by rule of thumb, as cracks begin there (no source read, "
+            f"part.target.beside_mm changes it); {reason}"
+        )
     names = [one.name for one in chosen]
     listed = ", ".join(names if len(names) <= MOST_NAMED else names[: MOST_NAMED - 1])
     if len(names) > MOST_NAMED:

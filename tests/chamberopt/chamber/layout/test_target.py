@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from manifold3d import CrossSection, Manifold
 
 from chamberopt.chamber.layout.sizes import Sizes, propose_sizes
@@ -19,8 +20,10 @@ from chamberopt.chamber.layout.target import (
     propose_target,
     surfaces,
 )
+from chamberopt.chamber.part import posed_part
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Wanted
+from chamberopt.common.errors import InputError
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from tests.chamberopt.chamber.layout.test_arbor import drum, part_of
 
@@ -249,6 +252,30 @@ def test_what_no_ball_touches_of_a_coarse_weld_is_left_out(tmp_path: Path) -> No
     assert made.tables["part.target"]["reachable"] is True
     part, wide = made.chamber.part, 7.0 * np.sqrt(2.0)
     left = float(part.area[part.target].sum())
-    within = wide - 2.0 * np.tan(np.radians(22.5))
+    off = np.tan(np.radians(22.5))
+    within = wide - 2.0 * off
+    within += 2.0 * (7.0 - off)  # of the plates, as far as the leg reaches
+    assert made.tables["part.target"]["beside_mm"] == 7.0
+    assert "with 7 mm of the faces beside the toes" in made.reasons["part.target"]
     assert "ROOTS ARE SHARP IN THE FILE" in made.reasons["part.target.reachable"]
     assert 1e6 * left == pytest.approx(2.0 * 60.0 * within, rel=0.02)
+
+
+@pytest.mark.parametrize("wide", [7.0, 3.2])
+def test_a_target_takes_a_strip_beside_its_hollow_edges(tmp_path: Path, wide: float) -> None:
+    """Both plates beside each weld, not the ends of the joint, nor what lies behind the plates.
+
+    Of a joint whose triangles are as long as its welds, the strips end straight.
+    """
+    part_of(tee(wide, 60.0))[1].export(tmp_path / "joint.stl")
+    made = propose(
+        tmp_path / "joint.stl", Wanted(unit="mm", ball_mm=2.0, alloy="S355"), lambda _: ()
+    )
+    design = made.design.changed({"part.target.reachable": False, "part.target.beside_mm": 2.0})
+    part = posed_part(design)[0]
+    area = 1e6 * float(part.area[part.target].sum())
+    assert area == pytest.approx(2.0 * 60.0 * (wide * np.sqrt(2.0) + 2.0 * 2.0), rel=1e-3)
+    body = trimesh.Trimesh(part.vertices, part.triangles, process=False)
+    assert body.is_watertight
+    with pytest.raises(InputError, match="no other face in a hollow edge"):
+        posed_part(design.changed({"part.target.faces": (), "part.target.surface": ("all",)}))
