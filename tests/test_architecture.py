@@ -45,7 +45,7 @@ ORDER = {
     "chamberopt/search": "study+optimiser trial_log study_folder "
     "sensitivity+observe+candidate judge ask_and_tell run_study pareto+run_sweep",
     "chamberopt/results": (
-        "vtp_files records load arrays_file looked_places write rebuild "
+        "vtp_files records load arrays_file looked_places+shot_push write rebuild "
         "flight+impacts+impact_energy compare command_records"
     ),
     "chamberopt/pictures": "charts+quantities drawing camera drawn_part "

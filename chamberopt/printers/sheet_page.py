@@ -36,6 +36,7 @@ from chamberopt.documents.sheet import (
     reference_limits,
     slit_limits,
 )
+from chamberopt.geometry.triangles import tetrahedron_volumes
 from chamberopt.peening.strip_holder import target_level_mm
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
 from chamberopt.pictures.charts.figure_style import ignore_settings_here
@@ -54,6 +55,7 @@ from chamberopt.printers.report_page import PageFile, require_free_page
 from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.load import load_result
 from chamberopt.results.looked_places import looked_places
+from chamberopt.results.shot_push import push_of_shot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -294,6 +296,7 @@ def write_sheet(
     with claim_file(path):
         arrays = load_result_arrays(loaded)
         chamber, places = arrays.chamber, looked_places(arrays)
+        push = push_of_shot(loaded, arrays)
         design, part, openings = loaded.design, chamber.part, find_openings(chamber)
         clear = clearance_of(loaded)
         built = AsBuilt(
@@ -309,6 +312,8 @@ def write_sheet(
             largest_flat_face(part),
             part_is_ceiling(chamber),
             outside_clamp(chamber).text,
+            None if push is None else (float(push[0]), float(push[1]), float(push[2])),
+            float(tetrahedron_volumes(part.vertices, part.triangles).sum()),
             places,
         )
         sheet = process_sheet(loaded, built, revision)

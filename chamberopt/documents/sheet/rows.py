@@ -43,6 +43,8 @@ class AsBuilt(NamedTuple):
     flat: FlatFace | None = None  # the part's largest, by which it is seen how it is turned
     is_ceiling: bool = False  # the part closes the room, which has no other ceiling
     clamp: str = ""  # what clamps the part where it stands out, in words
+    push: tuple[float, float, float] | None = None  # mean force of the shot on the part [N]
+    volume: float = 0.0  # of the part [m³]
     places: Sequence[LookedPlace] = ()  # of the target to look at, the least covered first
 
 

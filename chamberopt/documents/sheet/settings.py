@@ -52,6 +52,8 @@ LEAST_SLIT_MM = 0.2  # of both sides of a face, by heart: it vibrates and must t
 SQUARE = 0.9998  # cosine between a face's normal and an axis from which on it looks along the axis
 SAME_MM = 0.02  # lengths that differ by less count as equal
 MOST_KEYS = 8  # numbers of the chamber
+MOSTLY = 0.7  # share of a force along an axis from which on it is told to push that way
+GRAVITY = 9.81  # m/s²
 
 
 def chamber_limits(result: Result) -> dict[str, tuple[float, float, float]]:
@@ -209,6 +211,8 @@ def chamber_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
             else:
                 rows.append((name, with_limits(result, f"chamber.{key}", text)))
     yield from first_rows(rows, "numbers", MOST_KEYS)
+    if built.push is not None:
+        yield "hold it against", _push(result, built.push, built.volume)
     if iron := iron_of_walls(result.design.materials.part.alloy or "", wall or ""):
         yield "iron", for_the_shop(iron)
     yield "opened at", lid_in_words(built)
@@ -224,6 +228,28 @@ def chamber_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     yield "gaps", f"{places} {joint_in_words(ball)}, or sealed; {slit}"
     if volume := result.record.chamber.volume_mm3:
         yield "free volume", f"{plain(1e-3 * volume)} cm³"
+
+
+def _push(result: Result, push: tuple[float, float, float], volume: float) -> str:
+    """Return in words what a holder has to bear.
+
+    Args:
+        push: mean force of the shot on the part [N].
+        volume: of the part [m³].
+    """
+    axis = int(np.abs(push).argmax())
+    way = ("x", "y", "z")[axis]
+    size = float(np.linalg.norm(push))
+    along = f"{'+' if push[axis] > 0.0 else '−'}{way}" if abs(push[axis]) > MOSTLY * size else ""
+    told = f", mostly to {along}{', up' if along == '+z' else ''}" if along else ""
+    metal = find(result.design.materials.part.alloy, alloys())
+    weighs = "its weight is not known without its alloy"
+    if metal is not None:
+        weighs = f"it weighs {plain(GRAVITY * metal.density_kg_m3 * volume, 2)} N"
+    return (
+        f"the shot pushes the part by about {plain(size, 1)} N on average{told}, single impacts for "
+        f"microseconds far harder; {weighs}; what the drive and handling add is not in it"
+    )
 
 
 def sonotrode_rows(result: Result, face_mm: tuple[float, ...]) -> Iterator[Row]:
@@ -299,15 +325,20 @@ def step_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
             yield from first_rows([(f"opening, step {number}", one) for one in found], "openings")
 
 
-def _set_by(built: AsBuilt) -> str:
+def _set_by(result: Result, built: AsBuilt) -> str:
     """Return in words by what an operator sets how far a part is from the sonotrode."""
+    distance = result.design.chamber.sonotrode_distance_mm
+    block = f"on a block of {plain(distance)} mm on the sonotrode's face at rest"
     if walls_end_at(built.openings) is not None:
-        return "it lies on the walls, which set its distance"
+        return "it lies on the walls, which are its stop and set its distance"
     above = [one.beyond for one in built.openings if one.wall == CEILING]
     if above:
         out = plain(round(1e3 * max(above), 1))
-        return f"it stands {out} mm out, from the ceiling's inner side to its top: measure that"
-    return "measure from it to the face at rest"
+        return (
+            f"it stands {out} mm out, from the ceiling's inner side to its top: set that once "
+            f"without balls, {block}, and fix a stop there"
+        )
+    return f"set it {block}, clamp it, and take the block out"
 
 
 def run_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
@@ -317,7 +348,7 @@ def run_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     there before it.
     """
     design = result.design
-    mount = f"the part as above; {_set_by(built)}"
+    mount = f"the part as above; {_set_by(result, built)}"
     if design.effects.part_turn is not None:
         mount = "the part and its drive; turn it once by hand: it touches no wall"
     steps = [*design.in_steps.values()]

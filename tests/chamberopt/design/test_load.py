@@ -24,6 +24,7 @@ UNSET = (
     "shot.density_kg_m3",
     "process.accuracy.objective_half_width",
     "part.target.element_mm",
+    "part.target.beside_mm",
     "part.smoothing.tolerance_mm",
     "materials.part.yield_MPa",
     "materials.part.tensile_MPa",

@@ -21,6 +21,7 @@ from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.number_text import estimate_text
+from chamberopt.coverage.part_impacts import HITS_FILE, load_hits
 from chamberopt.design.almen_strip import USUAL_K
 from chamberopt.design.fixture import LEAST_GAP_MM, joint_in_words, slit_mm, tight_gap_mm
 from chamberopt.design.intensity import WantedIntensity
@@ -62,6 +63,8 @@ from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.load import Result, load_result
 from chamberopt.results.looked_places import MOST_PLACES, looked_places
 from chamberopt.results.records import FixtureRecord, TrappedRecord, ZoneLimit, ZoneRecord
+from chamberopt.results.shot_push import push_of_shot
+from sim_core import restitution_at
 from tests.helpers.drawings import boxes_of, require_apart
 from tests.helpers.results.report_folders import simulated
 from tests.helpers.synthetic import machine_values, plate_design
@@ -374,6 +377,32 @@ def test_a_part_is_accepted_by_places_shares_and_strips(folder: Path) -> None:
     none = dict(acceptance_rows(result, AsBuilt((50.0,))))
     assert none["places to look at"].startswith("all of the target")
     assert "first part" not in none
+
+
+def test_what_a_holder_bears_is_the_momentum_of_the_impacts(folder: Path) -> None:
+    """Each impact leaves m (1 + e) v along the normal, in all 5 s of all replicas."""
+    result = load_result(folder)
+    arrays = load_result_arrays(result)
+    push = push_of_shot(result, arrays)
+    assert push is not None
+    part, hits = arrays.chamber.part, load_hits(result.path(HITS_FILE)).hits
+    normal = trimesh.Trimesh(part.vertices, part.triangles, process=False).face_normals
+    back = 1.0 + restitution_at(hits.speed, result.design.materials.part.restitution)
+    each = result.design.shot.ball_mass * back * hits.speed
+    seconds = result.record.replicas * result.record.simulated_time_s
+    exact = -(each[:, None] * normal[hits.triangle]).sum(axis=0) / seconds
+    np.testing.assert_allclose(push, exact, atol=0.1 * np.linalg.norm(exact))
+    assert push[2] > 0.9 * np.linalg.norm(push)  # a plate whose lower side is peened
+    x, y, z = push
+    built = AsBuilt((50.0,), push=(x, y, z), volume=1e-6)
+    rows = dict(next(one for one in setting_tables(result, built) if one.caption == "Chamber").rows)
+    told = rows["hold it against"]
+    assert told.startswith(f"the shot pushes the part by about {plain(np.linalg.norm(push), 1)} N")
+    assert "to +z, up" in told
+    several = replace(
+        result, design=result.design.changed({"shot.diameter_mm": None, "shot.mix": MIX})
+    )
+    assert push_of_shot(several, arrays) is None
 
 
 @pytest.mark.parametrize(("half_width", "left"), [(50.0, 1), (math.inf, 3)])
