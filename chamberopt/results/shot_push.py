@@ -19,8 +19,9 @@ def push_of_shot(result: Result, arrays: ResultArrays) -> np.ndarray | None:
 
     It is the momentum across the surface that balls give up in a second: each impact leaves
     m (1 + e) v, with the mean normal speed v in a window round its triangle, which is off by some
-    per cent beside edges. Single impacts push far harder, for microseconds. None of a part that turns or stands in several poses, and of balls
-    of several sizes, whose impacts are not told apart.
+    per cent beside edges. Single impacts push far harder, for microseconds. None of a part that
+    turns or stands in several poses, and of balls of several sizes, whose impacts are not told
+    apart.
     """
     design, record = result.design, result.record
     if design.effects.part_turn is not None or design.steps or len(design.shot.sizes) > 1:

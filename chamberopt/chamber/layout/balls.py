@@ -295,7 +295,7 @@ def _best_of(free: Sequence[SizeFit], fits: Sequence[SizeFit]) -> tuple[SizeFit,
         best = as_good
         shown = sorted({*fits[:: max(1, len(fits) // MOST_LISTED)], best}, key=lambda x: x.diameter)
         shares = ", ".join(f"{_mm(one)} {one.served:.0%}" for one in shown)
-        text = f"NO SIZE SERVES ALL (fillets of 2, slots of 4 diameters); of the target: {shares}"
+        text = f"NO SIZE SUITS ALL (fillets of 2, slots of 4 diameters); of the target: {shares}"
     return best, text
 
 

@@ -441,7 +441,7 @@ def _told(
     off, more = wanted.off(predicted.value), ""
     if off:
         aim = f"{wanted.low:g}-{wanted.high:g}A"
-        more = f"; NO BALLS THAT SERVE THE TARGET GIVE {aim}: {_needed(made, off)}"
+        more = f"; NO BALLS THAT SUIT THE TARGET GIVE {aim}: {_needed(made, off)}"
     reasons = dict(made.reasons)
     ball = "the nearest to the intensity" if off else "chosen for the intensity"
     reasons[f"sonotrode.{key}"] += f", {ball}"

@@ -54,6 +54,7 @@ def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         how = f"; {MOUNTED[built.mountings[number]]}" if built.mountings else ""
         beyond = _beyond(way, openings, held, how)
         cut = opening_in_words(way, clearance_of(result))
+        beyond += _across(result, way)
         rows.append(("opening", f"{cut} at {place_of(way)} mm{frame}; {beyond}"))
     yield from first_rows(rows, "openings")
     if ribs := thin_ribs(openings):
@@ -104,6 +105,24 @@ def _grip(holder: Holder) -> str:
     if holder.kind not in ("collar", "plate") or not holder.grip_mm:
         return ""
     return f"; {plain(holder.grip_mm)} mm of it round the part, in two halves that clamp it"
+
+
+def _across(result: Result, one: Opening) -> str:
+    """Return in words along which axes an opening of the ceiling is as long as the room."""
+    chamber = result.design.chamber
+    round_mm = getattr(chamber, "diameter_mm", None)
+    sides = (getattr(chamber, key, round_mm) for key in ("length_mm", "width_mm"))
+    along = [
+        axis
+        for axis, side, size in zip("xy", sides, one.size, strict=True)
+        if one.wall == CEILING and side is not None and 1e-3 * side - size < EDGE
+    ]
+    if not along:
+        return ""
+    return (
+        f"; along {' and '.join(along)} it is as long as the room: the part goes on over the walls "
+        "there, and the ceiling is the pieces beside it"
+    )
 
 
 def clearance_of(result: Result) -> float:

@@ -52,7 +52,7 @@ def draw_chamber(
         size: width and height that it may have.
         limits: what the keys of [chamber] may be, for dimensions that show one of them.
         face: on which the chamber stands, whose joints the plan shows, and its rim where it is
-            larger than the floor.
+            larger than the floor and has room beside the plan.
     """
     (low, high), has_jaws = ends_of(chamber), False
     planes = section_planes(chamber)
@@ -74,12 +74,13 @@ def draw_chamber(
     corner = np.array([under if is_below else x + BESIDE, of_plan - 0.5 * deep + 1.0])
     view = View(0, scale, corner, low[:2], high[:2], np.zeros(3))
     draw_plan(axes, chamber, view, planes, limits)
-    dashed = [] if face is None else draw_face(axes, chamber, view, face)
+    dashed, beyond = ([], "") if face is None else draw_face(axes, chamber, view, face)
     text = scale_in_words(scale)
     what = "Section A–A" if len(planes) == 1 else "Sections A–A and B–B"
     jaws = ", white and crossed: jaws" if has_jaws else ""
     dashes = f", dashed: {' and '.join(dashed)}" if dashed else ""
-    return f"{what} and plan, scale {text}{dashes}{jaws}"
+    rim = f", not drawn: {beyond}" if beyond else ""
+    return f"{what} and plan, scale {text}{dashes}{rim}{jaws}"
 
 
 def drawing_height(chamber: Chamber, size: Point) -> float:

@@ -103,15 +103,14 @@ def _draw_places(axes: Axes, chamber: Chamber, view: View) -> None:
                 dimension(axes, (x, y1), (x, y2), -away, text, upright=True, before=low == wall)
 
 
-def draw_face(axes: Axes, chamber: Chamber, view: View, face: Face) -> list[str]:
+def draw_face(axes: Axes, chamber: Chamber, view: View, face: Face) -> tuple[list[str], str]:
     """Draw the joints between blocks on the floor, and the rim of a face that goes beyond it.
 
-    Return what was drawn, in words.
-    """
-    from matplotlib.patches import Rectangle
-    from matplotlib.path import Path
-    from matplotlib.transforms import Bbox
+    A rim that has no room round the plan is not drawn, and told instead.
 
+    Returns:
+        What was drawn, in words, and how far a face that is not drawn goes beyond the floor.
+    """
     floor = chamber.triangles[chamber.tags == TAG_SONOTRODE]
     area = outline_path(inside(1e3 * chamber.vertices[border_edges(floor)][:, :, :2]))
     assert area is not None
@@ -124,11 +123,15 @@ def draw_face(axes: Axes, chamber: Chamber, view: View, face: Face) -> list[str]
             (line,) = axes.plot(*view.place(ends).T, color=SONOTRODE, **look)
             line.set_clip_path(in_view, axes.transData)
     found = ["the joints of the floor's blocks"] if face.count > 1 else []
-    if (np.array(face.sides_mm) > np.ptp(area.vertices, axis=0) + WIDER).any():
-        rim = view.place(1e3 * face.outline[[*range(len(face.outline)), 0]])
-        low, high = view.place(np.array([view.low, view.high])) + np.array(FREE)
-        if Path(rim).intersects_bbox(Bbox([low, high]), filled=False):
-            (line,) = axes.plot(*rim.T, color=SONOTRODE, zorder=0.5, **look)  # below words
-            line.set_clip_path(Rectangle(tuple(low), *(high - low), transform=axes.transData))
-            found.append("the sonotrode's rim")
-    return found
+    if not (np.array(face.sides_mm) > np.ptp(area.vertices, axis=0) + WIDER).any():
+        return found, ""
+    outline = 1e3 * face.outline[[*range(len(face.outline)), 0]]
+    rim = view.place(outline)
+    low, high = view.place(np.array([view.low, view.high])) + np.array(FREE)
+    if ((rim > low) & (rim < high)).all():
+        axes.plot(*rim.T, color=SONOTRODE, zorder=0.5, **look)  # below words
+        return [*found, "the sonotrode's rim"], ""
+    over = np.stack([view.low - outline.min(axis=0), outline.max(axis=0) - view.high])
+    most = (plain(round(float(x), 1)) for x in np.maximum(over, 0.0).max(axis=0))
+    x, y = most
+    return found, f"the sonotrode's face goes on beyond the walls by {x} mm in x and {y} mm in y"

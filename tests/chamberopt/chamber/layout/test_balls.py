@@ -122,7 +122,7 @@ def test_what_serves_the_most_is_proposed_where_no_size_serves_all() -> None:
     ]
     diameter, reason = propose_ball(fits)
     assert diameter == 2e-3
-    assert "NO SIZE SERVES ALL" in reason
+    assert "NO SIZE SUITS ALL" in reason
     assert "1 mm 90%, 2 mm 89%, 3 mm 70%" in reason
     jams = [SizeFit(1e-3, 1.0, 1.0, True, 0.0, 100), SizeFit(2e-3, 1.0, 1.0, True, 1.988e-3, 100)]
     assert propose_ball(jams)[0] == 1e-3

@@ -168,9 +168,9 @@ def test_machines_of_other_laws_are_found_by_pilots(
     reach = [law.level * x.ball_mm**law.p * x.amplitude_um**law.q for x in possible]
     if any(not intensity.off(x) for x in reach):
         assert not intensity.off(value)
-        assert "NO BALLS THAT SERVE" not in made.reasons["process.intensity_mmA"]
+        assert "NO BALLS THAT SUIT" not in made.reasons["process.intensity_mmA"]
     else:
-        assert "NO BALLS THAT SERVE" in made.reasons["process.intensity_mmA"]
+        assert "NO BALLS THAT SUIT" in made.reasons["process.intensity_mmA"]
     assert made.design.process.intensity_mmA == (intensity.low, intensity.high)
 
 
@@ -273,7 +273,7 @@ def test_settings_that_are_not_resolved_are_given_up(plate: Path, shop: Shop) ->
     made = propose_intensity(bare, wanted, far, lambda _: bare, simulate)
     assert setting_of(made) == runs[0]
     assert len(runs) == len(set(runs)) <= MOST_PILOTS
-    assert "NO BALLS THAT SERVE" in made.reasons["process.intensity_mmA"]
+    assert "NO BALLS THAT SUIT" in made.reasons["process.intensity_mmA"]
 
 
 def test_a_shot_that_dents_no_strip_is_refused(plate: Path, shop: Shop) -> None:

@@ -66,15 +66,21 @@ def test_the_section_shows_the_part() -> None:
     assert "dashed" not in drawn
     for face, text in (
         (Face(diameter_mm=40.0), ""),
-        (Face(diameter_mm=90.0), ", dashed: the sonotrode's rim"),
-        (Face(diameter_mm=400.0), ""),  # far outside of the drawing
+        (Face(size_mm=(78.0, 36.0)), ", dashed: the sonotrode's rim"),
+        (Face(size_mm=(72.0, 72.0)), told_beyond(11, 20)),  # it would be cut off
         (
             Face(size_mm=(80.0, 80.0), columns=2),
-            ", dashed: the joints of the floor's blocks and the sonotrode's rim",
+            f", dashed: the joints of the floor's blocks{told_beyond(55, 24)}",
         ),
     ):
         told = draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0), face=face)
         assert told == f"{drawn}{text}"
+
+
+def told_beyond(x: int, y: int) -> str:
+    """How far a face that has no room in the plan goes on [mm], in words."""
+    over = f"by {x} mm in x and {y} mm in y"
+    return f", not drawn: the sonotrode's face goes on beyond the walls {over}"
 
 
 def test_a_drawing_takes_no_more_height_than_its_views() -> None:
