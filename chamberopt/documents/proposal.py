@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from chamberopt.chamber.checks.fillets import OF_FILLET, OF_SLOT
 from chamberopt.chamber.layout.target import area_in_mm2
 from chamberopt.chamber.propose.placed_proposal import START
+from chamberopt.chamber.propose.proposed_budget import OF_TIME
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.quicker import TRIED
 from chamberopt.chamber.propose.text import TO_SETTLE, clauses, to_settle
@@ -262,10 +263,13 @@ def _intensity(made: Proposal) -> str:
 
 
 def _time(made: Proposal) -> str:
-    """Return the treatment time in words, and that it is a start where no pilot told it."""
-    is_start = made.reasons.get("process.treatment_time_s", "").startswith(START)
+    """Return the treatment time in words, and that it is a start where no pilot told it.
+
+    It is one too where a pilot did not tell single places apart.
+    """
+    reason = made.reasons.get("process.treatment_time_s", "")
     time = time_in_words(made.design.process.treatment_time)
-    return f"{time} (a start)" if is_start else time
+    return f"{time} (a start)" if reason.startswith(START) or OF_TIME[1] in reason else time
 
 
 def _target(made: Proposal) -> str:

@@ -57,8 +57,11 @@ SELDOM = re.compile(
     r"fixture|seat|tip|leg|thread)s?(?![a-z])",
     re.I,
 )
-# Names of what runs in bearings: where they are no target, its size and finish must stay.
-RUNNING = re.compile(r"(?<![a-z])(?:pin|journal|race|bearing|zapfen)s?(?![a-z])", re.I)
+# Names of what runs in bearings or fits others: where they are no target, its size and finish must
+# stay.
+RUNNING = re.compile(
+    r"(?<![a-z])(?:pin|journal|race|bearing|zapfen|platform|dove.?tail|fir.?tree)s?(?![a-z])", re.I
+)
 CONFIRM = "confirm that it is what fails in use (choose another: --target)"
 BY_SIZE, BY_SHAPE = f"CHOSEN BY SIZE ALONE: {CONFIRM}", f"CHOSEN BY SHAPE: {CONFIRM}"
 AS_LARGE = 0.9  # of the largest face's area: the target takes a face as large, e.g. a blade's back

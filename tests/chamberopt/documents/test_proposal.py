@@ -56,6 +56,12 @@ def test_the_target_has_one_area_and_a_time_that_no_pilot_told_is_a_start(made: 
     of_pilot = {**made.reasons, "process.treatment_time_s": "an estimate"}
     told = proposal_in_words(replace(made, reasons=of_pilot), [])
     assert "for 5 min with" in told.sentence
+    unresolved = {
+        **of_pilot,
+        "process.treatment_time_s": "an estimate; TIME NOT RESOLVED for single",
+    }
+    told = proposal_in_words(replace(made, reasons=unresolved), [])
+    assert "for 5 min (a start) with" in told.sentence
 
 
 def test_balls_that_are_many_are_told_with_what_pilots_say_of_larger_ones(made: Proposal) -> None:

@@ -11,7 +11,7 @@ import trimesh
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.openings import Opening, find_walls_in_holes
-from chamberopt.chamber.layout.target import Surface, surfaces
+from chamberopt.chamber.layout.target import RUNNING, Surface, surfaces
 from chamberopt.chamber.propose import proposed_mask
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Wanted
@@ -39,6 +39,15 @@ def test_what_fits_to_other_parts_is_masked(name: str) -> None:
 @pytest.mark.parametrize("name", ["BASE", "wholesale", "SHANK", "boretto", "TIP", "FILLETS"])
 def test_other_names_are_not(name: str) -> None:
     assert not NEVER.search(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "runs"),
+    [("PLATFORM_UNDERSIDE", True), ("dovetail", True), ("fir tree 2", True), ("journals", True),
+     ("form", False), ("tree", False), ("spinner", False)],
+)  # fmt: skip
+def test_what_runs_or_fits_by_its_name_is_masked_too(name: str, runs: bool) -> None:
+    assert (RUNNING.search(name) is not None) is runs
 
 
 def test_a_pad_stands_on_level_tops_beside_the_target() -> None:
