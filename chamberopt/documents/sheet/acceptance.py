@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 TIME = "time_to_98_s"
 LENS = "a magnifier of 10 to 30 times (SAE J2277)"
+LEAST_SEEN = 0.2  # share of dents below which it is hard to see how large it is
 COVERED = 0.98  # share of dents that counts as full coverage (SAE J2277)
 LEAST_MISSED = 5e-3  # share of the target out of reach that is told
 COUPON = (
@@ -41,8 +42,8 @@ def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
             f"{listed} mm of the part's file, numbered on the page Coverage by place: where the "
             f"fewest dents are expected, off the edges; by {LENS}",
         )
-        if not result.design.steps:
-            yield "first part", _first_part(result, built)
+        if text := _first_part(result, built):
+            yield "first part", text
     else:
         yield "places to look at", f"all of the target, by {LENS}: too few dents tell places apart"
     seen = f"each of places 1 to {len(places)}" if len(places) > 1 else "the target"
@@ -61,13 +62,16 @@ def _first_part(result: Result, built: AsBuilt) -> str:
     """Return in words after which time to stop the first part, and what to see there by then.
 
     It is half of the time to 98 %, where shares still tell a slow machine from a quick one, and no
-    longer than the part is to be peened.
+    longer than the part is to be peened. The text is empty where hardly a dent is seen by then, or
+    the part is peened in several steps.
     """
     planned, time = result.design.process.treatment_time, result.metrics.get(TIME)
     half = 0.5 * (planned if time is None or not time.has_number else time.value)
     after = min(half, planned)
     what = "half of the time to 98 %" if after == half and half != 0.5 * planned else ""
     shares = [one.coverage(after / planned) for one in built.places]
+    if result.design.steps or max(shares) < LEAST_SEEN:
+        return ""
     told = ", ".join(f"{per_cent(x)} at {k}" for k, x in enumerate(shares, 1))
     ranges, exposure = result.record.ranges, result.metrics.get("exposure")
     ends = None if ranges is None else ranges.figures.get("exposure")

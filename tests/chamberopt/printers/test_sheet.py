@@ -374,6 +374,8 @@ def test_a_part_is_accepted_by_places_shares_and_strips(folder: Path) -> None:
     wide = replace(result, design=result.design.changed({"chamber.diameter_mm": 140.0}))
     told = dict(acceptance_rows(wide, built))["intensity"]
     assert told.endswith("agree on a range in mmA by strips in the lid, as under Measure first")
+    few = [one._replace(density=0.1) for one in places]
+    assert "first part" not in dict(acceptance_rows(result, built._replace(places=few)))
     none = dict(acceptance_rows(result, AsBuilt((50.0,))))
     assert none["places to look at"].startswith("all of the target")
     assert "first part" not in none
