@@ -72,7 +72,7 @@ def iron_of_walls(part: str, walls: str) -> str:
     return (
         f"IRON FROM THE WALLS: balls carry what they wear from {of_walls.name} onto {name}, "
         f"whatever they are made of: walls of {hard}, or lined with it, which slow the balls more "
-        "where they are softer (materials.wall, simulate again), or decontaminate the part after "
+        "where they are softer (simulate again), or decontaminate the part after "
         "peening (no source read)"
     )
 
