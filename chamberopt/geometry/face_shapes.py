@@ -181,7 +181,7 @@ def beside_toes(vertices: np.ndarray, triangles: np.ndarray, own: np.ndarray) ->
     sides, _, turn = _hollow_turns(vertices, triangles)
     touching = np.unique(sides[_is_toe(sides, turn, own)] // 3)
     faces = Faces(vertices, triangles, BEVEL_DEG[0])
-    return np.isin(faces.of_triangle, faces.of_triangle[touching]) & ~own
+    return np.asarray(np.isin(faces.of_triangle, faces.of_triangle[touching]) & ~own)
 
 
 def _is_toe(sides: np.ndarray, turn: np.ndarray, own: np.ndarray) -> np.ndarray:
