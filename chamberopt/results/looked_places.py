@@ -13,10 +13,11 @@ if TYPE_CHECKING:
     from chamberopt.results.arrays_file import ResultArrays
 
 MOST_PLACES = 3
-# Patches are cubes of the target's diagonal over this, of which dents are told as a mean: single
-# windows scatter, and the least of many would tell of luck. Places are two patches apart.
+# Patches are what cubes of the target's diagonal over this hold of one face, such as a root between
+# teeth. Their dents are told as a mean over windows, so many at least: single windows scatter, and
+# the least of many would tell of luck. Places are two cubes apart.
 PATCHES = 8.0
-LEAST_FILLED = 0.25  # area of a patch over that of its cube's side
+LEAST_WINDOWS = 3.0
 
 
 class LookedPlace(NamedTuple):
@@ -40,11 +41,14 @@ class LookedPlace(NamedTuple):
         return float(coverage_from_dent_density(np.array(times * self.density)))
 
 
-def looked_places(arrays: ResultArrays) -> list[LookedPlace]:
+def looked_places(arrays: ResultArrays, gauge: float) -> list[LookedPlace]:
     """Return the least covered patches of a target, apart from each other, the least first.
 
     There are none where too few dents were simulated to tell places apart, or where the part's file
     is not known.
+
+    Args:
+        gauge: area of a window [m²].
     """
     display, part = arrays.display, arrays.chamber.part
     mesh, fields = display.mesh, display.fields
@@ -57,9 +61,7 @@ def looked_places(arrays: ResultArrays) -> list[LookedPlace]:
     place, weight = mesh.vertices[known].astype(float), weight[known]
     covered = coverage_from_dent_density(fields["dent_density"][known].astype(float))
     side = float(np.linalg.norm(np.ptp(place, axis=0))) / PATCHES
-    # Both sides of a thin plate are patches of their own.
-    looks = np.sign(np.round(mesh.normal[known], 1))
-    cell = np.concatenate([np.floor(place / side), looks], axis=1)
+    cell = np.column_stack([np.floor(place / side), mesh.face[known]])
     _, patch = np.unique(cell, axis=0, return_inverse=True)
     patch = patch.reshape(-1)
     area = np.bincount(patch, weight)
@@ -71,7 +73,7 @@ def looked_places(arrays: ResultArrays) -> list[LookedPlace]:
         nearest = own[np.linalg.norm(place[own] - middle[one], axis=1).argmin()]
         at = place[nearest]
         is_apart = all(np.linalg.norm(at - other.at) > 2.0 * side for other in found)
-        if area[one] < LEAST_FILLED * side**2 or not is_apart:
+        if area[one] < LEAST_WINDOWS * gauge or not is_apart:
             continue
         x, y, z = (1e3 * (at - part.file.shift) @ part.file.rotation).tolist()
         density = -float(np.log1p(-min(mean[one], 1.0 - 1e-9)))

@@ -248,7 +248,7 @@ def _push(result: Result, push: tuple[float, float, float], volume: float) -> st
         weighs = f"it weighs {plain(GRAVITY * metal.density_kg_m3 * volume, 2)} N"
     return (
         f"the shot pushes the part by about {plain(size, 1)} N net on average{told}, single "
-        f"impacts for microseconds far harder; {weighs}; what the drive and handling add is not in it"
+        f"impacts for microseconds far harder; {weighs}; what drive and handling add is not in it"
     )
 
 

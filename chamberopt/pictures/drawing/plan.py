@@ -132,6 +132,6 @@ def draw_face(axes: Axes, chamber: Chamber, view: View, face: Face) -> tuple[lis
         axes.plot(*rim.T, color=SONOTRODE, zorder=0.5, **look)  # below words
         return [*found, "the sonotrode's rim"], ""
     over = np.stack([view.low - outline.min(axis=0), outline.max(axis=0) - view.high])
-    most = (plain(round(float(x), 1)) for x in np.maximum(over, 0.0).max(axis=0))
-    x, y = most
-    return found, f"the sonotrode's face goes on beyond the walls by {x} mm in x and {y} mm in y"
+    most = zip("xy", over.max(axis=0).tolist(), strict=True)
+    told = (f"{plain(round(by, 1))} mm in {axis}" for axis, by in most if by > WIDER)
+    return found, f"the sonotrode's face goes on beyond the walls by {' and '.join(told)}"

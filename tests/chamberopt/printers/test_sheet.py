@@ -351,7 +351,7 @@ def test_a_part_is_accepted_by_places_shares_and_strips(folder: Path) -> None:
     """
     result = load_result(folder)
     arrays = load_result_arrays(result)
-    places = looked_places(arrays)
+    places = looked_places(arrays, 1e-6 * result.record.field.gauge_mm2)
     assert [one.density for one in places] == sorted(one.density for one in places)
     assert 1 < len(places) <= MOST_PLACES
     part = arrays.chamber.part
