@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from chamberopt.common.number_text import rounded
+from chamberopt.coverage.metrics import FULL_COVERAGE
 from chamberopt.documents.sheet.rows import AsBuilt, Row
 from chamberopt.documents.wanted import intensity_text
 from chamberopt.documents.wording import per_cent, plain
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 TIME = "time_to_98_s"
 LENS = "a magnifier of 10 to 30 times (SAE J2277)"
 LEAST_SEEN = 0.2  # share of dents below which it is hard to see how large it is
-COVERED = 0.98  # share of dents that counts as full coverage (SAE J2277)
 LEAST_MISSED = 5e-3  # share of the target out of reach that is told
 COUPON = (
     "a coupon of the part's metal in its place, which SAE AMS 2580A allows where no strip can be"
@@ -51,7 +51,7 @@ def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     but = f", but the {per_cent(missed)} that no ball can touch (see Warnings)"
     yield (
         "ACCEPT or REJECT",
-        f"ACCEPT coverage if dents lie on {per_cent(COVERED)} or more of {seen}, and nothing else "
+        f"ACCEPT coverage if dents lie on {per_cent(FULL_COVERAGE)} or more of {seen}, and nothing else "
         f"of the target is bare{but if missed > LEAST_MISSED else ''}. If not, peen the part for "
         "the same time once more and look again; REJECT it if it is still less.",
     )
