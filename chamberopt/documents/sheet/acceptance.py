@@ -51,8 +51,8 @@ def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     but = f", but the {per_cent(missed)} that no ball can touch (see Warnings)"
     yield (
         "ACCEPT or REJECT",
-        f"ACCEPT coverage if dents lie on {per_cent(FULL_COVERAGE)} or more of {seen}, and nothing else "
-        f"of the target is bare{but if missed > LEAST_MISSED else ''}. If not, peen the part for "
+        f"ACCEPT coverage if dents lie on {per_cent(FULL_COVERAGE)} or more of {seen}, and nothing "
+        f"else of the target is bare{but if missed > LEAST_MISSED else ''}. If not, peen the part for "
         "the same time once more and look again; REJECT it if it is still less.",
     )
     yield "intensity", _intensity(result, built)
