@@ -52,8 +52,8 @@ def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     yield (
         "ACCEPT or REJECT",
         f"ACCEPT coverage if dents lie on {per_cent(FULL_COVERAGE)} or more of {seen}, and nothing "
-        f"else of the target is bare{but if missed > LEAST_MISSED else ''}. If not, peen the part for "
-        "the same time once more and look again; REJECT it if it is still less.",
+        f"else of the target is bare{but if missed > LEAST_MISSED else ''}. If not, peen the part "
+        "for the same time once more and look again; REJECT it if it is still less.",
     )
     yield "intensity", _intensity(result, built)
 
