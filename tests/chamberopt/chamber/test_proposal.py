@@ -14,60 +14,18 @@ from shapely import Polygon
 from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.layout.pose import pose_in_words
 from chamberopt.chamber.layout.shot_material import choose_shot, iron_of_walls
-from chamberopt.chamber.layout.sizes import Sizes
 from chamberopt.chamber.layout.target import Surface, propose_target, surfaces
-from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose import proposed_room
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.held_proposal import is_firm
-from chamberopt.chamber.propose.proposal import (
-    Wanted,
-    propose_charge,
-    propose_ranges,
-    touched_share,
-)
-from chamberopt.chamber.propose.proposed_mask import find_left_out
+from chamberopt.chamber.propose.proposal import Wanted, touched_share
 from chamberopt.chamber.propose.proposed_steps import turned_over
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.chamber.shop import StockBalls, usual_shop
 from chamberopt.common.errors import InputError
-from chamberopt.design.part import Target
 from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
-from chamberopt.geometry.triangles import area_vectors, areas
-from chamberopt.search.study.parameters import Varied
-from tests.helpers.four_parts import FOUR_PARTS
-
-
-@pytest.mark.parametrize(
-    ("floor_mm2", "ball_mm", "height_mm", "mass_g", "reason"),
-    [
-        (2700, 3, 63, 19, "half a layer"),
-        (92400, 3, 355, 650, "half a layer"),  # 653 g, of which a study has no steps
-        (1075, 0.1, 39, 0.041, "less than half a layer"),  # of more than 10,000 balls
-        (1.4e6, 3, 1533, 1100, "less than half a layer"),
-        (3e6, 20, 1900, 10000, "the most that is supported"),  # of shot.mass_g
-    ],
-)
-def test_a_study_takes_what_is_proposed(
-    floor_mm2: float, ball_mm: float, height_mm: float, mass_g: float, reason: str
-) -> None:
-    """Its values have a number of steps that it takes, the start among them, within the limits."""
-    ball_mass = 7790.0 * np.pi / 6.0 * (1e-3 * ball_mm) ** 3
-    charge, why, full = propose_charge(1e-6 * floor_mm2, 1e-3 * ball_mm, ball_mass)
-    assert (charge, why[: len(reason)]) == (pytest.approx(mass_g), reason)
-    assert bool(full) == reason.startswith("less than")
-    assert full * ball_mass * 1e3 > 1.1 * charge or not full
-    distance = max(8e-3, 0.3e-3 * height_mm)
-    below = 1e-3 * height_mm - distance - 5e-3 * ball_mm
-    sizes = Sizes("box", {}, distance, 1e-3 * height_mm, 0.01, False, below)
-    starts = (height_mm, round(1e3 * distance), charge)
-    ranges = propose_ranges(sizes, charge, ball_mm, ball_mass)
-    for (name, one), start in zip(ranges.items(), starts, strict=True):
-        varied = Varied(**one._asdict())
-        assert start in varied.values(is_whole=False), name
-    assert ranges["chamber.height_mm"].high <= 2000
-    assert ranges["shot.mass_g"].high <= min(10000.0, 20000e3 * ball_mass)
+from chamberopt.geometry.triangles import area_vectors
 
 
 def test_the_inside_of_a_tube_is_no_back_of_its_outside(tmp_path: Path) -> None:
@@ -242,48 +200,6 @@ def test_walls_of_steel_beside_a_metal_that_iron_spoils_are_told(
     assert iron_of_walls(part, walls).startswith("IRON FROM THE WALLS") is is_told
 
 
-def test_what_faces_away_is_offered_for_leaving_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The heel ends of a bevel gear's teeth face away from the sonotrode, its apex down."""
-    monkeypatch.setattr("chamberopt.chamber.propose.proposed_mask.met_beside", lambda *_: [])
-    monkeypatch.setattr("chamberopt.chamber.propose.proposed_mask.open_holes", lambda _: "")
-    mesh = read_part(FOUR_PARTS["bevel_gear"].write(tmp_path), "mm")
-    known = surfaces(mesh)
-    target, area = propose_target(mesh, known, []), areas(mesh.vertices, mesh.triangles)
-    heels, toes = (next(o.triangles for o in known if o.name == f"face {k}") for k in (7, 9))
-    share = np.where(toes, 0.5, 1.0)
-    for room in ("proposal", "proposed_mask"):
-        monkeypatch.setattr(f"chamberopt.chamber.propose.{room}.touched", lambda *_: share)
-    part = SimpleNamespace(target=Target(**target.keys), rotate_deg=(0.0, 0.0, 0.0))
-    posed = SimpleNamespace(
-        vertices=mesh.vertices, triangles=mesh.triangles, target=target.triangles, area=area
-    )
-    made = SimpleNamespace(
-        mesh=mesh,
-        known=known,
-        design=SimpleNamespace(part=part, steps=None, in_steps=FEW_BALLS),
-        chamber=SimpleNamespace(part=posed, steps=()),
-        tables={"part": {"mesh": str(tmp_path / "gear.obj")}, "part.target": target.keys},
-        reasons={},
-        trials=(),
-        poses=(),
-        strips=None,
-    )
-    away, hidden, sharp = find_left_out(made)
-    assert sharp.text.startswith("SHARP EDGES")
-    assert away.text == "the 12% that face away from the sonotrode (face 7)"
-    assert hidden.text == "the 3% that no ball touches here"
-    text = design_text(made, tmp_path, [away, hidden])
-    for line in ("direction = [0, 0, -1]", "angle_deg = [0, 105]", "reachable = true"):
-        assert f"# {line}" in text
-        text = text.replace(f"# {line}", line)  # as a user would
-    table = tomllib.loads(text)["part"]["target"]
-    left = chosen_triangles(mesh, Target.model_validate(table))
-    assert (left == target.triangles & ~heels).all()
-    assert table["reachable"]
-
-
 def _lowest(known: Sequence[Surface]) -> list[str]:
     """Name the face whose place is the lowest in the part's file."""
     return [min(known, key=lambda one: one.keys["faces"][0]["at_mm"][2]).name]
@@ -420,12 +336,6 @@ def test_no_ball_gets_over_a_roof_between_two_walls(tmp_path: Path) -> None:
     assert not [one for one in made.warnings if one.kind is WarningKind.REST]
     assert touched_share(made) > 0.99
     assert [*made.bounds] == ["shot.mass_g"]  # no study raises the ceiling again
-
-
-def test_a_study_lowers_no_part_until_the_face_hits_what_is_outside() -> None:
-    sizes = Sizes("box", {}, 17e-3, 55e-3, 10e-3, False, 20e-3)
-    low = [propose_ranges(sizes, 5.3, 2.0, 2.5e-5, is_raised=one) for one in (False, True)]
-    assert [one["chamber.sonotrode_distance_mm"].low for one in low] == [7, 17]
 
 
 @pytest.mark.long

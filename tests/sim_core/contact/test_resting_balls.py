@@ -30,6 +30,18 @@ def test_a_settling_heap_falls_still_and_is_reported() -> None:
     assert len(result.resting) > 25
 
 
+def test_a_longer_warm_up_makes_the_times_of_rest_earlier_by_as_much() -> None:
+    places = np.array([[0.004 * k - 0.002, 0.006, 0.01] for k in (1, 2, 3)])
+    room, balls = box((0.012, 0.012, 0.05)), Balls(places, 0.0 * places, DIAMETER)
+    without, with_warm_up = (
+        simulate(Scene(room, balls, physics(0.9, 0.005), 2.0 - warm_up, warmup=warm_up)).resting
+        for warm_up in (0.0, 1.5)
+    )
+    assert without.ball.tolist() == [0, 1, 2]
+    assert (without.since > 0.0).all()
+    np.testing.assert_allclose(with_warm_up.since, without.since - 1.5, rtol=1e-9)
+
+
 def test_on_the_sonotrode_nothing_rests() -> None:
     room = cylinder(0.012, 0.02, sections=12)
     shaking = Vibration(FLOOR, 25e-6, 20e3, 0.3)

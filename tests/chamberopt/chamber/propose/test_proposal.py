@@ -1,4 +1,4 @@
-"""Tolerances of a proposal, by ISO 2768-1 class m and of the amplitude, and its study's bounds."""
+"""Charge and tolerances of a proposal, and the ranges that a study of it takes."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -11,6 +11,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import warnings
 from chamberopt.chamber.checks.place_names import PART, PART_SIDE
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
+from chamberopt.chamber.layout.sizes import Sizes
 from chamberopt.chamber.layout.target import Surface
 from chamberopt.chamber.propose import held_proposal
 from chamberopt.chamber.propose.held_proposal import _where_left
@@ -18,9 +19,12 @@ from chamberopt.chamber.propose.proposal import (
     COUNTED,
     holding,
     new_harm,
+    propose_charge,
+    propose_ranges,
     propose_tolerances,
     warned_again,
 )
+from chamberopt.search.study.parameters import Varied
 from tests.helpers.synthetic import plate_design
 
 
@@ -113,3 +117,40 @@ def test_what_is_left_out_is_named(
     left = np.isin(np.arange(6), hidden) * 1.0
     said = told if radius < 3e-3 else told.replace(" in hollows of about {} mm", "")
     assert _where_left(made, left) == said.format(f"{1e3 * radius:.2g}")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("floor_mm2", "ball_mm", "height_mm", "mass_g", "reason"),
+    [
+        (2700, 3, 63, 19, "half a layer"),
+        (92400, 3, 355, 650, "half a layer"),  # 653 g, of which a study has no steps
+        (1075, 0.1, 39, 0.041, "less than half a layer"),  # of more than 10,000 balls
+        (1.4e6, 3, 1533, 1100, "less than half a layer"),
+        (3e6, 20, 1900, 10000, "the most that is supported"),  # of shot.mass_g
+    ],
+)
+def test_a_study_takes_what_is_proposed(
+    floor_mm2: float, ball_mm: float, height_mm: float, mass_g: float, reason: str
+) -> None:
+    """Its values have a number of steps that it takes, the start among them, within the limits."""
+    ball_mass = 7790.0 * np.pi / 6.0 * (1e-3 * ball_mm) ** 3
+    charge, why, full = propose_charge(1e-6 * floor_mm2, 1e-3 * ball_mm, ball_mass)
+    assert (charge, why[: len(reason)]) == (pytest.approx(mass_g), reason)
+    assert bool(full) == reason.startswith("less than")
+    assert full * ball_mass * 1e3 > 1.1 * charge or not full
+    distance = max(8e-3, 0.3e-3 * height_mm)
+    below = 1e-3 * height_mm - distance - 5e-3 * ball_mm
+    sizes = Sizes("box", {}, distance, 1e-3 * height_mm, 0.01, False, below)
+    starts = (height_mm, round(1e3 * distance), charge)
+    ranges = propose_ranges(sizes, charge, ball_mm, ball_mass)
+    for (name, one), start in zip(ranges.items(), starts, strict=True):
+        varied = Varied(**one._asdict())
+        assert start in varied.values(is_whole=False), name
+    assert ranges["chamber.height_mm"].high <= 2000
+    assert ranges["shot.mass_g"].high <= min(10000.0, 20000e3 * ball_mass)
+
+
+def test_a_study_lowers_no_part_until_the_face_hits_what_is_outside() -> None:
+    sizes = Sizes("box", {}, 17e-3, 55e-3, 10e-3, False, 20e-3)
+    low = [propose_ranges(sizes, 5.3, 2.0, 2.5e-5, is_raised=one) for one in (False, True)]
+    assert [one["chamber.sonotrode_distance_mm"].low for one in low] == [7, 17]

@@ -1,6 +1,7 @@
 """Surfaces that must not be peened, by their names, and holes that the wall crosses."""
 
 import re
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,12 +12,14 @@ import trimesh
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.openings import Opening, find_walls_in_holes
-from chamberopt.chamber.layout.target import RUNNING, Surface, surfaces
+from chamberopt.chamber.layout.target import RUNNING, Surface, propose_target, surfaces
+from chamberopt.chamber.part import chosen_triangles
 from chamberopt.chamber.propose import proposed_mask
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.propose.proposed_mask import (
     NEVER,
+    are_holes,
     find_left_out,
     met_beside,
     moved_openings,
@@ -24,8 +27,12 @@ from chamberopt.chamber.propose.proposed_mask import (
     pads,
     sharp_edges,
 )
-from chamberopt.geometry.meshes.part_mesh import PartMesh
+from chamberopt.chamber.propose.text import design_text
+from chamberopt.design.part import Target
+from chamberopt.geometry.meshes.part_mesh import PartMesh, read_part
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
+from chamberopt.geometry.triangles import areas
+from tests.helpers.four_parts import FOUR_PARTS
 
 
 @pytest.mark.parametrize(
@@ -48,6 +55,24 @@ def test_other_names_are_not(name: str) -> None:
 )  # fmt: skip
 def test_what_runs_or_fits_by_its_name_is_masked_too(name: str, runs: bool) -> None:
     assert (RUNNING.search(name) is not None) is runs
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0])
+@pytest.mark.parametrize(("walls", "is_all"), [(20, True), (19, True), (17, False), (0, False)])
+def test_a_surface_that_is_no_more_than_the_walls_of_holes_has_a_tenth_of_its_area_beside_them(
+    unit: float, walls: int, is_all: bool
+) -> None:
+    """A strip of 30 triangles alike, of which 20 are named."""
+    row = np.arange(32)
+    strip = SimpleNamespace(
+        vertices=unit * np.c_[row, row % 2, np.zeros(32)],
+        triangles=np.c_[row, row + 1, row + 2][:30],
+    )
+    named, other = (Surface(name, {}, row[:30] < k, "") for name, k in (("A", 20), ("B", 30)))
+    holes = [SimpleNamespace(triangles=own) for own in (row[:30] < walls, row[:30] >= 25)]
+    assert are_holes(strip, [named, other], ["A"], holes) == is_all
+    assert not are_holes(strip, [named, other], ["B"], holes)
+    assert are_holes(strip, [named, other], [], holes)
 
 
 def test_a_pad_stands_on_level_tops_beside_the_target() -> None:
@@ -178,3 +203,46 @@ def test_the_face_that_goes_on_beside_a_fillet_is_met(monkeypatch: pytest.Monkey
     told = sum(float(one) for one in re.findall(r"([0-9]+) mm²", met.text))
     assert told == pytest.approx(1e6 * area[~bent].sum(), abs=2.0)
     assert " mm² more; what has to keep" in met.text  # one of four faces is not named
+
+
+def test_what_faces_away_is_offered_for_leaving_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The heel ends of a bevel gear's teeth face away from the sonotrode, its apex down."""
+    monkeypatch.setattr("chamberopt.chamber.propose.proposed_mask.met_beside", lambda *_: [])
+    monkeypatch.setattr("chamberopt.chamber.propose.proposed_mask.open_holes", lambda _: "")
+    mesh = read_part(FOUR_PARTS["bevel_gear"].write(tmp_path), "mm")
+    known = surfaces(mesh)
+    target, area = propose_target(mesh, known, []), areas(mesh.vertices, mesh.triangles)
+    heels, toes = (next(o.triangles for o in known if o.name == f"face {k}") for k in (7, 9))
+    share = np.where(toes, 0.5, 1.0)
+    for room in ("proposal", "proposed_mask"):
+        monkeypatch.setattr(f"chamberopt.chamber.propose.{room}.touched", lambda *_: share)
+    few_balls = {"": SimpleNamespace(shot=SimpleNamespace(count=100, diameter=1e-3))}
+    part = SimpleNamespace(target=Target(**target.keys), rotate_deg=(0.0, 0.0, 0.0))
+    posed = SimpleNamespace(
+        vertices=mesh.vertices, triangles=mesh.triangles, target=target.triangles, area=area
+    )
+    made = SimpleNamespace(
+        mesh=mesh,
+        known=known,
+        design=SimpleNamespace(part=part, steps=None, in_steps=few_balls),
+        chamber=SimpleNamespace(part=posed, steps=()),
+        tables={"part": {"mesh": str(tmp_path / "gear.obj")}, "part.target": target.keys},
+        reasons={},
+        trials=(),
+        poses=(),
+        strips=None,
+    )
+    away, hidden, sharp = find_left_out(made)
+    assert sharp.text.startswith("SHARP EDGES")
+    assert away.text == "the 12% that face away from the sonotrode (face 7)"
+    assert hidden.text == "the 3% that no ball touches here"
+    text = design_text(made, tmp_path, [away, hidden])
+    for line in ("direction = [0, 0, -1]", "angle_deg = [0, 105]", "reachable = true"):
+        assert f"# {line}" in text
+        text = text.replace(f"# {line}", line)  # as a user would
+    table = tomllib.loads(text)["part"]["target"]
+    left = chosen_triangles(mesh, Target.model_validate(table))
+    assert (left == target.triangles & ~heels).all()
+    assert table["reachable"]

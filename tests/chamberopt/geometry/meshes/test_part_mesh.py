@@ -8,8 +8,9 @@ import pytest
 import trimesh
 
 from chamberopt.common.errors import InputError
-from chamberopt.geometry.meshes.part_mesh import read_part
-from chamberopt.geometry.triangles import tetrahedron_volumes
+from chamberopt.geometry.meshes.part_mesh import TriangleSoup, close_surface, read_part
+from chamberopt.geometry.meshes.raw_mesh import number_by_position
+from chamberopt.geometry.triangles import tetrahedron_volumes, unit_vectors
 from tests.helpers.mesh_files import ball_corners, box_corners, write_ascii_stl, write_stl
 
 
@@ -133,3 +134,28 @@ def test_a_million_triangles_are_read_healed_and_checked(tmp_path: Path) -> None
     assert len(part.triangles) == len(corners) == 1310720
     assert any("closed 2 small holes" in note for note in part.notes)
     assert any("turned 500 triangles" in note for note in part.notes)
+
+
+def test_normals_of_the_file_stay_at_their_corners_whichever_way_a_triangle_is_turned() -> None:
+    """A ball of radial normals, of which some triangles and normals look inwards, and two slant."""
+    ball = trimesh.creation.icosphere(2)
+    corners, radial, row = 1e-2 * ball.triangles, ball.triangles.copy(), np.arange(len(ball.faces))
+    for k, degrees in ((1, 58.0), (2, 62.0)):  # what leaves its facet by 60 degrees is not meant
+        along = corners[k, 1] - corners[k, 0]
+        along *= np.tan(np.radians(degrees)) / np.linalg.norm(along)
+        radial[k, 0] = unit_vectors(ball.face_normals[k] + along)
+    wanted = radial.copy()
+    wanted[2, 0] = ball.face_normals[2]
+    turned, inwards = row % 3 == 0, row % 5 == 0
+    normals = np.where(inwards[:, None, None], -radial, radial)
+    at = corners.copy()
+    at[turned], normals[turned] = corners[turned, ::-1], normals[turned, ::-1]
+
+    soup = TriangleSoup(
+        Path("ball"), at, number_by_position(len(row)), {}, (), "", "m", 0 * row, normals
+    )
+    part = close_surface(soup)
+    corner = part.vertices[part.triangles]
+    same = (corner[:, :, None] == corners[:, None]).all(axis=3)  # of the file's, (m, 3, 3)
+    assert (same.sum(axis=(1, 2)) == 3).all()
+    np.testing.assert_allclose(part.normals, np.einsum("mab,mbi->mai", same, wanted))
