@@ -158,6 +158,20 @@ def test_dents_on_a_crease_keep_their_area_half_on_each_side() -> None:
     assert shares == pytest.approx([0.5, 0.5, 0.0], abs=0.01)
 
 
+@pytest.mark.parametrize("sides", [9, 10])
+def test_dents_on_an_edge_that_is_a_crease_to_some_windows_keep_their_area(sides: int) -> None:
+    """The sides of a prism turn by 36 or 40 degrees."""
+    mesh, rng = trimesh.creation.cylinder(8e-3, 12e-3, sections=sides), np.random.default_rng(5)
+    chamber = chamber_round(mesh, mesh.face_normals[:, 0] > 0.8)  # the two beside the edge
+    place = np.array([[8e-3, 0.0, 0.0]]) + np.outer(rng.uniform(-2e-3, 2e-3, 300), [0.0, 0.0, 1.0])
+    at_edge = (mesh.triangles[:, :, 0] > 8e-3 - 1e-9).sum(axis=1) == 2
+    hits = dents_at(DESIGN, np.full(300, np.flatnonzero(at_edge)[0]), place, 0.5e-3)
+    field = field_of(chamber)
+    found = find_footprints(field, field.gauge, hits)
+    assert 0.1 * found.area < found.area_on_creases < 0.9 * found.area
+    assert booked_area(field, field.gauge, hits) == pytest.approx(sum_of_areas(hits), rel=0.02)
+
+
 def test_the_band_beside_a_crease_is_exact_across_it() -> None:
     """At a distance h from it, 2 sqrt(a² - h²) of each dent over the length of the window."""
     chamber, a = bar(), 0.5e-3

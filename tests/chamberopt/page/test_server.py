@@ -4,6 +4,7 @@ import http.client
 import json
 import select
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -17,10 +18,12 @@ import pytest
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.facts import describe
 from chamberopt.chamber.propose.text import GOALS, study_of_design
+from chamberopt.common.errors import InputError
 from chamberopt.design.load import load_design
 from chamberopt.documents.facts import facts_in_words
 from chamberopt.page.edited_file import EditedFile
 from chamberopt.page.page_words import TERMS
+from chamberopt.page.server import serve
 from chamberopt.search.study import load_study
 from tests.chamberopt.page.conftest import Served
 from tests.hunt.base import write_base
@@ -320,6 +323,28 @@ def test_what_cannot_be_served_is_one_line(served: Served, tmp_path: Path) -> No
     assert ended.returncode == 2
     assert "--port" in ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+class Listening(Exception):  # noqa: N818
+    """Ends a server as soon as it has its port."""
+
+
+def test_a_port_just_left_is_taken(tmp_path: Path) -> None:
+    """The server's end of a connection that it closed first holds the port for a minute."""
+
+    def end(address: str) -> None:
+        raise Listening(address)
+
+    with socket.create_server(("127.0.0.1", 0)) as left:
+        port = left.getsockname()[1]
+        with socket.create_connection(("127.0.0.1", port)) as client:
+            left.accept()[0].close()
+            assert client.recv(1) == b""
+    with pytest.raises(Listening, match=f":{port}/"):
+        serve(tmp_path, None, port, False, end)
+    # Nobody may share it with a server that listens.
+    with socket.create_server(("127.0.0.1", port)), pytest.raises(InputError, match="--port: "):
+        serve(tmp_path, None, port, False, end)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")

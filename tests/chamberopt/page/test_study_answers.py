@@ -4,6 +4,7 @@ import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.design.load import load_design
 from chamberopt.page import further_study
 from chamberopt.page.acts import Acts, list_results
-from chamberopt.page.study_answers import candidate_answer, candidates_answer, model_answer
+from chamberopt.page.study_answers import _front, candidate_answer, candidates_answer, model_answer
 from chamberopt.search.study import load_study
 from chamberopt.search.trial_log import read_trials
 from tests.helpers.results.followed_study import BUDGET, Hill, followed_study
@@ -66,6 +67,26 @@ def test_every_candidate_is_there_as_the_log_has_it(out: Path) -> None:
         assert (one["objective"] is None) == (not trial.goals)
     scores = [one.goals[0].value for one in trials if one.goals and one.stage == "search"]
     assert [best for _, best in answer["best"]] == np.maximum.accumulate(scores).tolist()
+
+
+def test_the_front_names_candidates_as_the_page_does_from_the_least_of_the_first_objective() -> (
+    None
+):
+    rng = np.random.default_rng(0)
+    rows = [(2.0, 1.0), (0.0, 3.0), (1.0, 2.0), (0.5, 2.0), (3.0, 3.0), (3.0, 3.0), ()]
+    for order in (np.arange(7), rng.permutation(7)):
+        trials: Any = [
+            SimpleNamespace(
+                number=number,
+                goals=[SimpleNamespace(value=one) for one in rows[k]],
+                stage="confirm" if k == 5 else "search",
+                feasible=k != 4,
+            )
+            for number, k in enumerate(order)
+        ]
+        named = [int(order[one - 1]) for one in _front(trials)]
+        assert named == [1, 2, 0]
+        assert _front(trials[:0]) == []
 
 
 def test_figures_of_a_candidate_are_in_words_with_units_and_intervals(out: Path) -> None:

@@ -79,6 +79,24 @@ def test_exact_profiles_give_the_factors_back() -> None:
     assert both.misfit.values == 2 * one.misfit.values
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_factors_lie_within_three_standard_deviations_of_the_law(sign: float) -> None:
+    """A law whose stress grows at each of three depths by 50 MPa a standard deviation of a factor.
+
+    With an error of 10 MPa the prior draws a factor back by 1/26.
+    """
+    depth, sd = np.array([0.0, 10.0, 20.0]), law_prior().sd
+    stress = 50.0 * sign * np.array([3.3, 0.0, -2.6]) - 1e3
+    measured = MeasuredProfile(
+        method="x-ray", depth_um=tuple(depth), stress_MPa=tuple(stress), sd_MPa=10.0
+    )
+    one = CouponProfile(
+        "metal", measured, lambda factors: (depth, 50.0 * np.log(factors) / sd - 1e3)
+    )
+    found = np.array(fit_law([one]).log_mean) / sd
+    assert found == pytest.approx(sign * np.array([3.0, 0.0, -2.5]), abs=1e-3)
+
+
 def test_a_profile_of_another_shape_widens_the_errors() -> None:
     found = fit_law([coupon(np.random.default_rng(2), AS_IS, sd=2.0, bend=0.8)])
     assert found.misfit.error_scale > 2.0

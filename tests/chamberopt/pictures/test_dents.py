@@ -14,8 +14,9 @@ from chamberopt.coverage.dents import Dents
 from chamberopt.design.load import load_design
 from chamberopt.geometry.triangles import area_vectors
 from chamberopt.pictures import picture_page
+from chamberopt.pictures.actors import Discs
 from chamberopt.pictures.camera import flat_normal
-from chamberopt.pictures.dents import GROUND, dent_colours
+from chamberopt.pictures.dents import GROUND, _with_rims, dent_colours
 from chamberopt.pictures.drawn_part import DrawnPart
 from chamberopt.pictures.subprocess_drawing import missing_opengl
 from chamberopt.results.arrays_file import ARRAYS_FILE, read_result_arrays, save_result_arrays
@@ -106,6 +107,17 @@ def test_one_dent_is_a_disc_of_its_diameter_at_its_place(plate: Chamber, tmp_pat
     assert (x, y) == pytest.approx((1.0 - middle[0], 2.0 - middle[1]), abs=pixel)
     cosine = 1.0 / np.linalg.norm(SLANTED)
     assert white_share(slanted).sum() * wide**2 == pytest.approx(cosine * area, rel=0.03)
+
+
+@pytest.mark.parametrize("pixel_mm", [0.01, 0.04])
+def test_a_disc_of_twelve_pixels_or_less_has_no_rim(pixel_mm: float) -> None:
+    """A larger disc lies with four fifths of its radius on itself in 72 % of its brightness."""
+    radius = pixel_mm * np.array([5.9, 6.1, 60.0])  # half its diameter
+    place, colour = np.arange(9.0).reshape(3, 3), np.full((3, 3), 200, np.uint8)
+    found = _with_rims(Discs(place, place, radius, colour), pixel_mm)
+    assert (found.place[:, 0] == [0.0, 3.0, 3.0, 6.0, 6.0]).all()
+    assert found.radius / pixel_mm == pytest.approx([5.9, 6.1, 0.8 * 6.1, 60.0, 48.0])
+    assert (found.colour[:, 0] == [200, 144, 200, 144, 200]).all()
 
 
 @pytest.mark.long

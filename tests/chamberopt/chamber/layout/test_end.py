@@ -12,6 +12,7 @@ from manifold3d import Manifold, Mesh
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.layout.end import (
+    LocalRoom,
     Shape,
     bare_end,
     can_be_clamped,
@@ -22,7 +23,7 @@ from chamberopt.chamber.layout.end import (
     root_out,
     strip,
 )
-from chamberopt.chamber.layout.sizes import propose_sizes
+from chamberopt.chamber.layout.sizes import Sizes, propose_sizes
 from chamberopt.chamber.layout.target import Surface, Target
 from chamberopt.chamber.propose import proposed_mask
 from chamberopt.chamber.propose.first_design import propose
@@ -152,6 +153,26 @@ def test_a_wall_at_a_face_stays_there_as_the_floor_grows() -> None:
         middle = room.middle(type(other)("box", plan, 0.0, 0.0, 0.0, False, 0.0))
         assert 1e3 * middle[0] + 0.5 * plan["length_mm"] == pytest.approx(0.2)
         assert middle[1] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("closed", [(), ("z",)])
+@pytest.mark.parametrize("lower_mm", [0.0, 3.0, 7.25])
+def test_a_part_that_reaches_lower_gets_as_much_more_height(
+    closed: tuple[str, ...], lower_mm: float
+) -> None:
+    plan = {"length_mm": 40.0, "width_mm": 30.0}
+    sizes = Sizes("box", plan, 8e-3, 31e-3, 5e-3, bool(closed), 20e-3, closed)
+    room = LocalRoom(sizes, np.zeros((2, 2)), np.zeros((2, 2), bool), 4e-3)
+    found = room.as_low_as(sizes, 4e-3 - 1e-3 * lower_mm)
+    higher_mm = 1e3 * (found.height - sizes.height)
+    if closed:  # up to the lid, in half millimetres, for which the part is raised
+        assert higher_mm == pytest.approx(math.ceil(2.0 * lower_mm) / 2.0)
+        raised_mm = higher_mm - lower_mm
+    else:
+        assert higher_mm == pytest.approx(math.ceil(lower_mm))
+        raised_mm = 0.0
+    assert 1e3 * (found.distance - sizes.distance) == pytest.approx(raised_mm)
+    assert 1e3 * (found.top - sizes.top) == pytest.approx(lower_mm)
 
 
 @pytest.mark.parametrize(("begins", "wall"), [(-60.0, -22.0), (-21.0, -30.0)])

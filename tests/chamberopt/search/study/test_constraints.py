@@ -22,6 +22,9 @@ def test_a_constraint_is_priced_by_what_is_to_be_expected_beyond_it() -> None:
     limits = Limits(min=0.5)
     assert expected_violation(Estimate(0.4, 0.0), limits) == pytest.approx(0.2)
     assert expected_violation(Estimate(0.6, 0.0), limits) == 0.0
+    assert expected_violation(Estimate(-2.0, 0.0), Limits(min=1e-10)) == pytest.approx(2e10)
+    for nothing in (0.0, 1e-13):  # the excess itself
+        assert expected_violation(Estimate(-2.0, 0.0), Limits(min=nothing)) == pytest.approx(2.0)
     # Of a normal figure at its limit: its standard error over sqrt(2 pi).
     at_limit = estimate(0.5 + np.array([-0.1, 0.1, -0.1, 0.1]))
     error = np.std(at_limit.pseudovalues, ddof=1) / 2.0
