@@ -49,7 +49,8 @@ def share_in_words(share: Estimate) -> str:
 def plain(value: float | str, digits: int = 4) -> str:
     """Return a number as text with `digits` significant digits.
 
-    Numbers below 1e-4 and from 1e9 on in size have an exponent. A text is returned as it is.
+    Numbers below 1e-4 and from 1e9 on in size have an exponent and one digit less. A text is
+    returned as it is.
     """
     if isinstance(value, str):
         return value

@@ -1,6 +1,7 @@
 """Where flexure of a part is simulated, how soft the part is there, and what is said of it."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,12 @@ import pytest
 
 from chamberopt.chamber.analytic import analytic_cavity
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.flexure import flexure_facts, flexure_of_surfaces, softness_of_part
+from chamberopt.chamber.flexure import (
+    flexure_facts,
+    flexure_of_surfaces,
+    mean_softness,
+    softness_of_part,
+)
 from chamberopt.chamber.scene import build_scene, chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
@@ -96,6 +102,21 @@ def test_thick_parts_are_rigid_by_themselves() -> None:
         assert not thin_notes(chamber)
         assert flexure_of_surfaces(design, chamber, chamber_mesh(chamber)) is None
         assert flexure_facts(design, chamber) == {}
+        assert mean_softness(design, chamber) == 1.0
+
+
+def test_softness_is_told_by_the_area_in_the_chamber(blade: Design, chamber: Chamber) -> None:
+    """Of a target of which one triangle alone is in the chamber, it is that of the triangle."""
+    softness = softness_of_part(blade, chamber.part)
+    assert softness is not None
+    target = np.flatnonzero(chamber.part.target & (softness < 1.0))
+    for one in (target[softness[target].argmin()], target[softness[target].argmax()]):
+        exposed = np.where(np.arange(len(softness)) == one, 1e-6, 0.0)
+        alone = replace(chamber, exposed_area=exposed)
+        assert mean_softness(blade, alone) == pytest.approx(softness[one])
+        facts = flexure_facts(blade, alone)["flexure"]
+        assert facts["lowers_restitution_on_share"] == float(softness[one] < 0.98)
+        assert facts["restitution_times"] == pytest.approx(softness[one], rel=5e-3)
 
 
 def test_flexure_can_be_left_out_and_asked_for(blade: Design) -> None:

@@ -1,7 +1,9 @@
 """The memory of an evaluation: foretold within a factor of 2, bounded, refused in time."""
 
 import tracemalloc
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -51,6 +53,36 @@ def test_what_an_evaluation_takes_is_foretold(points: int, replicas: int, no_roo
     finally:
         tracemalloc.stop()
     assert 0.5 < evaluation_bytes(design, chamber, replicas) / taken < 2.0
+
+
+def test_more_of_anything_takes_as_much_more_as_it_is() -> None:
+    """Impacts come as in a gas of balls, n V A / 4 a second; the chamber of the plate is a drum."""
+    design = design_with(20_000, 8)
+    chamber = build_chamber(design)
+
+    def taken(replicas: int, more: Mapping[str, Any] | None = None) -> float:
+        return evaluation_bytes(design.changed(more or {}), chamber, replicas)
+
+    base, seconds, points = taken(8), 0.4, 20_000
+    gas = design.shot.count / chamber.volume * design.sonotrode.peak_speed / 4.0
+    on_part = 150.0 * gas * float(chamber.exposed_area.sum())
+    sides = chamber.vertices[chamber.triangles]
+    cross = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
+    logged = 100.0 * gas * 0.5 * float(np.linalg.norm(cross, axis=1).sum())
+    assert taken(10) - base == pytest.approx(2 * (110.0 * points + on_part * seconds))
+    assert taken(60) - taken(50) == pytest.approx(10 * on_part * seconds)  # batches are full
+    longer = taken(8, {"process.accuracy.simulated_time_s": 1.4}) - base
+    assert longer == pytest.approx(8 * on_part + logged)
+    finer = taken(8, {"process.accuracy.points": 2 * points}) - base
+    assert finer == pytest.approx((550.0 + 8 * 110.0) * points)
+    # Smaller windows: more pieces, until there are as many as are made.
+    gauge, area = design.process.accuracy.gauge_mm2, chamber.part.area[chamber.part.target].sum()
+    smaller = taken(8, {"process.accuracy.gauge_mm2": 0.5 * gauge}) - base
+    assert smaller == pytest.approx(120.0 * 6 * 1e6 * area / gauge)
+    zone = {"name": "a", "target": {"direction": [0, 0, -1], "angle_deg": [0, 30]}}
+    first, second = (taken(8, {"zones": [zone, zone | {"name": "b"}][:k]}) - base for k in (1, 2))
+    assert first == pytest.approx(250.0 * points + 120.0 * 6 * 1e6 * area / gauge)
+    assert second == pytest.approx(2 * first)
 
 
 def test_figures_are_the_same_where_pairs_are_found_again(monkeypatch: pytest.MonkeyPatch) -> None:
