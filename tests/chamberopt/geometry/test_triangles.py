@@ -172,6 +172,18 @@ def test_the_height_of_a_triangle_is_that_over_its_longest_side() -> None:
     assert areas(vertices, triangles) == pytest.approx([6.0, 6.0, 6.0, 0.0, 0.0])
 
 
+def test_normals_are_across_their_triangles_by_the_right_hand() -> None:
+    corners = np.random.default_rng(5).normal(size=(30, 3, 3))
+    normals, (a, b, c) = facet_normals(corners), corners.swapaxes(0, 1)
+    for k in range(3):
+        one = normals[:, k]
+        assert np.linalg.norm(one, axis=1) == pytest.approx(1.0)
+        for side in (b - a, c - b):
+            assert np.einsum("ij,ij->i", one, side) == pytest.approx(0.0, abs=1e-12)
+        assert (np.einsum("ij,ij->i", one, np.cross(b - a, c - b)) > 0.0).all()
+    assert not facet_normals(corners[:, [0, 0, 1]]).any()
+
+
 def test_what_is_linear_is_interpolated_exactly_wherever_a_point_lies() -> None:
     rng = np.random.default_rng(1)
     corners, slope = rng.normal(size=(40, 3, 3)), rng.normal(size=(3, 2))
