@@ -132,6 +132,7 @@ def test_a_swept_piece_encloses_its_area_times_the_way_along_its_normal(
     for each in (np.array(way), np.tile(way, (len(square.vertices), 1))):
         vertices, triangles = swept(np.asarray(square.vertices), own, each)
         assert len(side_pairs(triangles)) * 2 == 3 * len(triangles)
+        assert triangles.min() >= 0
         assert tetrahedron_volumes(vertices, triangles).sum() == pytest.approx(12.0)
 
 

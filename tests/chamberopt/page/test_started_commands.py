@@ -5,9 +5,11 @@ import re
 import signal
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from chamberopt.page.started_commands import StartedCommand
 from tests.chamberopt.page.conftest import Served
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self").exists(), reason="looks in /proc")
@@ -74,3 +76,25 @@ def test_nothing_outlives_the_server(name: str, command: str, tmp_path: Path) ->
     page.process.send_signal(signal.Signals[name])
     page.process.communicate(timeout=60)
     assert not left_in(tmp_path)
+
+
+def ended(command: StartedCommand) -> dict[str, Any]:
+    """Its status when it has ended."""
+    until = time.monotonic() + 60.0
+    while command.status()["exit"] is None:
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    return command.status()
+
+
+def test_a_result_is_kept_when_its_command_has_ended_and_left_it(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "result.json").write_text("{}")
+    good = StartedCommand(["--version"], tmp_path, "out")
+    bad = StartedCommand(["check", "none.toml"], tmp_path)
+    assert (good.status()["exit"], good.status()["kept"]) == (None, False)
+    one, two = ended(good), ended(bad)
+    assert (one["exit"], one["kept"], one["fault"], one["at"]) == (0, True, [], {})
+    assert one["printed"]
+    assert (two["exit"], two["kept"], two["fault"]) == (2, False, two["printed"])
+    assert "none.toml" in str(two["fault"])

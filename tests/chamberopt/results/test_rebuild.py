@@ -1,5 +1,6 @@
 """A result's chamber and replicas are those that were simulated."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from chamberopt.chamber.scene import build_scene, chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.results.load import Result
 from chamberopt.results.rebuild import _identity, rebuild_replica
+from sim_core import simulate
 from tests.helpers.results.short_plate import plate_result
 
 
@@ -31,6 +33,25 @@ def test_a_replica_has_the_scene_of_the_chamber_that_is_built(result: Result) ->
 def test_a_replica_that_is_not_there_is_refused(result: Result, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--replica: given 3; the result has 3, give 0 to 2"):
         rebuild_replica(result, 3)
+
+
+def test_impacts_are_the_results_own_to_the_last_bit(result: Result) -> None:
+    """Those on the wall, and those after the recorded time, are no part of a result."""
+    replica = rebuild_replica(result, 0)
+    log = simulate(replica.scene).impacts
+    on_part = np.flatnonzero(replica.chamber.source[replica.on_chamber(log).triangle] >= 0)
+    assert len(on_part) > 0
+    speed = log.normal_speed.copy()
+    speed[on_part[0]] *= 1.0 + 1e-6
+    with pytest.raises(InputError, match=f" 1 of {len(on_part)} impacts are not the result's"):
+        replica.on_chamber(replace(log, normal_speed=speed))
+    time = log.time.copy()
+    time[on_part[0]] = replica.scene.duration
+    replica.on_chamber(replace(log, normal_speed=speed, time=time))
+    on_wall = np.ones(len(log), dtype=bool)
+    on_wall[on_part] = False
+    other = np.where(on_wall, 2.0 * log.normal_speed, log.normal_speed)
+    replica.on_chamber(replace(log, normal_speed=other))
 
 
 def test_impacts_are_alike_only_if_triangle_and_speed_are_the_same() -> None:

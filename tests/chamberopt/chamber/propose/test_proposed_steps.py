@@ -2,7 +2,10 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 import trimesh
 
@@ -12,13 +15,14 @@ from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_budget import Measured, propose_budget
 from chamberopt.chamber.propose.proposed_intensity import LARGER
-from chamberopt.chamber.propose.proposed_steps import with_finer_balls, without_finer
+from chamberopt.chamber.propose.proposed_steps import OVER, _over, with_finer_balls, without_finer
 from chamberopt.chamber.propose.text import design_text
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate
 from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.load import load_design
 from chamberopt.documents.proposal import proposal_in_words, proposal_lines
+from chamberopt.geometry.triangles import rotation_matrix
 
 SLOT, COARSE, FINER = 5.0, 3.0, 1.0  # mm: balls of a quarter of the slot serve it
 
@@ -173,3 +177,25 @@ def test_a_second_pose_is_tried_for_what_is_hidden_or_uneven(
     monkeypatch.setattr(proposed_steps, "touched_share", lambda _: share)
     found = pilot(10.0, 0.2)._replace(places=places, time_to_98=seconds)
     assert proposed_steps.is_worth_a_second_pose(coarse, found) is is_tried
+
+
+@pytest.mark.parametrize("axis", OVER)
+@pytest.mark.parametrize("turns", [(0.0, 0.0, 0.0), (90.0, 0.0, -45.0), (20.0, -35.0, 130.0)])
+def test_a_part_is_turned_over_by_half_a_turn_about_the_named_axis(
+    axis: str, turns: tuple[float, float, float]
+) -> None:
+    """About a unit vector u half a turn is 2 uu - 1, also of what is beside the chamber's axis."""
+    names = {"x": (1, 0), "y": (0, 1), "the diagonal of x and y": (1, 1)}
+    along = np.array([*names.get(axis, (1, -1)), 0.0])
+    half = 2.0 * np.outer(along, along) / (along @ along) - np.eye(3)
+    part = SimpleNamespace(rotate_deg=turns, offset_mm=(3.0, 5.0))
+    made: Any = SimpleNamespace(
+        design=SimpleNamespace(part=part, shot=SimpleNamespace(diameter=2e-3)),
+        tables={"chamber": {"height_mm": 40.0}},
+    )
+    values, (first, second) = _over(made, axis, raised=1.5)
+    assert values == {"chamber": {"height_mm": 43.0}}
+    assert "part" not in first
+    over = rotation_matrix(tuple(second["part"]["rotate_deg"]))
+    np.testing.assert_allclose(over, half @ rotation_matrix(turns), atol=1e-12)
+    np.testing.assert_allclose(second["part"]["offset_mm"], (half @ (3.0, 5.0, 0.0))[:2])
