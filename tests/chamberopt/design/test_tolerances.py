@@ -7,7 +7,7 @@ import pytest
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.design.load import load_design, save_design
-from chamberopt.design.tolerances import require_tolerances, tolerance_box
+from chamberopt.design.tolerances import iso_2768_m, require_tolerances, tolerance_box
 from tests.helpers.synthetic import machine_values, plate_design
 
 PLATE = plate_design(chamber__height_mm=16.0)
@@ -94,3 +94,10 @@ def test_the_design_must_be_able_to_have_both_ends() -> None:
     design = tolerated(chamber__sonotrode_distance_mm=["-1 %", 2])
     with pytest.raises(InputError, match=r"^tolerances\.chamber\.sonotrode_distance_mm: .* = 17: "):
         require_tolerances(design)
+
+
+def test_deviations_grow_with_the_length_at_the_ends_of_the_ranges_of_the_standard() -> None:
+    ends = {6.0: 0.1, 30.0: 0.2, 120.0: 0.3, 400.0: 0.5, 1000.0: 0.8, 2000.0: 1.2}
+    assert [iso_2768_m(length) for length in ends] == list(ends.values())
+    beyond = [iso_2768_m(length + 0.01) for length in ends]
+    assert beyond == [*list(ends.values())[1:], 1.2]

@@ -147,6 +147,13 @@ def test_edges_are_sharp_beyond_their_angle(degrees: float, count: int) -> None:
     assert sorted(length) == pytest.approx([side] * min(count, 24) + [2.0] * max(count - 24, 0))
 
 
+def test_without_an_angle_edges_are_sharp_beyond_thirty_degrees() -> None:
+    for sections, is_sharp in ((11, True), (13, False)):
+        prism = trimesh.creation.cylinder(1.0, 2.0, sections=sections)
+        found = sharp_edges(np.asarray(prism.vertices), np.asarray(prism.faces))
+        assert len(found) == (2 + is_sharp) * sections
+
+
 def test_a_floor_has_walls_all_round_unless_what_is_beside_it_is_level() -> None:
     room = trimesh.creation.box((2.0, 2.0, 1.0)).subdivide()
     vertices, triangles = np.asarray(room.vertices), np.asarray(room.faces)

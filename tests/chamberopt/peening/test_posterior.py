@@ -1,6 +1,8 @@
 """What measurements tell, with straight lines for models: true ones, and one that is wrong."""
 
 import numpy as np
+import pytest
+from scipy.special import chdtri
 
 from chamberopt.design.calibration import Parameter
 from chamberopt.peening.posterior import (
@@ -63,3 +65,21 @@ def test_intervals_hold_where_data_scatter_more_than_their_errors() -> None:
     assert wider > 0.82  # of 4 values, whose scatter tells less, fewer
     assert plain < 0.6
     assert unexplained > 0.9
+
+
+@pytest.mark.parametrize(("chance", "is_explained"), [(0.052, True), (0.048, False)])
+def test_errors_grow_where_less_than_one_case_in_twenty_scatters_so(
+    chance: float, is_explained: bool
+) -> None:
+    """A machine that is known, with four values off by as much each."""
+    known = Prior(NAMES, np.zeros(3), np.full(3, 1e-6))
+    chi2 = float(chdtri(4, chance))
+    y, errors = np.full(4, ERROR * np.sqrt(chi2 / 4.0)), ERROR**2 * np.eye(4)
+    rows = np.array([[1.0, 0.5, 0.0]] * 4)
+    found = explaining_posterior(
+        [Data("arc heights", "", np.arange(4), y, errors, line(rows))], known, known.mean, ANYWHERE
+    )
+    (one, _) = found.misfits
+    assert one.chi2 == pytest.approx(chi2, rel=1e-3)
+    assert one.values == 4
+    assert one.error_scale == pytest.approx(1.0 if is_explained else np.sqrt(chi2 / 4.0), rel=1e-3)

@@ -11,6 +11,7 @@ from chamberopt.coverage.field.target_field import (
     PIECES_PER_WINDOW,
     TargetField,
     WindowSetting,
+    _longest_side,
     find_target_field,
     require_narrow_gauge,
     require_wide_gauge,
@@ -206,3 +207,23 @@ def test_windows_of_other_dents_are_the_same_and_their_bands_those_of_a_new_fiel
     for column in ("point", "height", "length"):
         assert np.array_equal(getattr(now, column), getattr(wanted, column))
     assert field.with_largest_dent(dents) is field
+
+
+def test_a_piece_is_as_long_as_a_window_or_a_ball_unless_there_are_too_many() -> None:
+    for gauge, ball in ((np.pi * 1e-6, 9e-3), (np.pi * 1e-4, 2e-3)):
+        setting = WindowSetting(gauge, 100, ball, 1e-3)
+        assert _longest_side(setting, 1e-9, 1e9) == pytest.approx(2e-3)
+        # Twice the count needs half the area each; a window has six pieces at most.
+        few = _longest_side(setting, 1.0, 1000.0)
+        assert np.pi * (0.5 * few) ** 2 == pytest.approx(PIECES_PER_WINDOW * 1e-3)
+        assert _longest_side(setting, 1.0, 4000.0) == pytest.approx(0.5 * few)
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 10_000])
+def test_some_points_go_from_the_first_to_the_last(count: int) -> None:
+    field = field_of(plane_chamber(), points=1000)
+    found = field.some_points(count).place
+    there = field.touched.place
+    assert len(found) == min(count, len(there))
+    np.testing.assert_array_equal(found[0], there[0])
+    np.testing.assert_array_equal(found[-1], there[-1 if count > 1 else 0])
