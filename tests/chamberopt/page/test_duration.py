@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from chamberopt.design.load import save_design
-from chamberopt.page.duration import _whole_seconds, duration_in_words
+from chamberopt.page.duration import _in_words, _whole_seconds, duration_in_words
 from chamberopt.results.load import Result
 from tests.helpers.results.short_plate import plate_result
 from tests.helpers.synthetic import DESIGNS
@@ -39,3 +39,45 @@ def test_a_study_takes_as_long_as_its_evaluations(result: Result, tmp_path: Path
 
 def test_nothing_is_said_of_another_part(result: Result) -> None:
     assert duration_in_words(DESIGNS / "gear.toml", [result.folder]) == ""
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [
+        (1.0, "5 s"),
+        (42.0, "40 s"),
+        (89.0, "90 s"),
+        (91.0, "2 minutes"),
+        (59.0 * 60.0, "59 minutes"),
+        (5399.0, "90 minutes"),
+        (5400.0, "1.5 hours"),
+        (100.0 * 3600.0, "1e+02 hours"),
+    ],
+)
+def test_a_time_is_told_in_the_unit_that_suits_it(seconds: float, words: str) -> None:
+    assert _in_words(seconds, seconds) == f"about {words}"
+    assert _in_words(120.0, 300.0) == "about 2 to 5 minutes"
+    assert _in_words(60.0, 80.0) == "about 60 to 80 s"
+    assert _in_words(2880.0, 7200.0) == "about 0.8 to 2 hours"
+
+
+def test_a_design_takes_as_much_longer_as_it_has_more_balls_and_simulates_longer(
+    result: Result,
+) -> None:
+    design, record = result.design, result.record
+    ranges = record.ranges.cost if record.ranges else 0.0
+    known = _whole_seconds(design, 1, result)
+    assert known == pytest.approx(sum(record.timings_s.values()) * (1.0 + ranges))
+    accuracy = design.process.accuracy
+    whole = accuracy.simulated_time_s + accuracy.warmup_time_s
+    longer = {"process.accuracy.simulated_time_s": 3.0 * accuracy.simulated_time_s}
+    more = {"shot.mass_g": 2.0 * design.shot.mass_g}
+    for changes, times in (
+        (longer, (whole + 2.0 * accuracy.simulated_time_s) / whole),
+        (more, design.changed(more).shot.count / design.shot.count),
+        ({"process.accuracy.replicas": 3 * record.replicas}, 3.0),
+    ):
+        assert _whole_seconds(design.changed(changes), 1, result) == pytest.approx(times * known)
+    if record.study is None:  # of several candidates each takes as long; ranges are the best's
+        several = _whole_seconds(design, 4, result)
+        assert several == pytest.approx(4.0 * known / (1.0 + ranges))

@@ -7,7 +7,7 @@ import pytest
 
 from chamberopt.common.errors import InputError
 from chamberopt.search.study import Study, load_study
-from chamberopt.search.study.parameters import ParameterSpace
+from chamberopt.search.study.parameters import ParameterSpace, Varied, bound_at
 from tests.helpers.known_optima import GEAR
 from tests.helpers.synthetic import DESIGNS
 
@@ -174,3 +174,22 @@ def make_study(vary: object, design: object, **tables: object) -> Study:
     from chamberopt.design.design import validate
 
     return validate(Study, {"design": design, "vary": vary, **tables})
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_a_step_fits_once_or_more_and_makes_no_more_than_a_thousand_values(unit: float) -> None:
+    for count in (1, 2, 999):
+        one = Varied(low=0.0, high=unit * count, step=unit)
+        assert len(one.values(is_whole=False)) == count + 1
+    for count in (0.9, 1000):
+        with pytest.raises(ValueError, match="give a step that fits 1 to 999 times"):
+            Varied(low=0.0, high=unit * count, step=unit)
+    assert Varied(low=0.0, high=0.3 * unit, step=(0.1 + 0.2) * unit)  # wider by rounding alone
+
+
+def test_a_number_is_at_a_bound_up_to_a_thousandth_of_their_distance() -> None:
+    ends = (20.0, 60.0)
+    for away, said in ((0.0, True), (0.039, True), (0.041, False)):
+        assert bound_at(20.0 + away, ends) == ("lower" if said else "")
+        assert bound_at(60.0 - away, ends) == ("upper" if said else "")
+    assert bound_at("box", ("box", "prism")) == ""
