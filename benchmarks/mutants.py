@@ -5,13 +5,13 @@
     python benchmarks/mutants.py --seeds 20 --first 0 --wide
 
 Each seed draws a file of the program that has a file of tests of its own, and puts one fault into
-it: an operator or comparison becomes its opposite, a number grows by a half or to its successor, or
-a thousandfold if it guards against rounding, a term of a sum or a factor of a product is dropped, a
-condition is turned round. The tests of that file run on a copy of the program, without the fault
-and with it; a fault that they pass is missed, with `--wide` only if all tests of their folder pass
-it too. Faults that change nothing count as missed, so the share is a lower bound. Lines for people
-(messages, descriptions) get no faults. A fault in the simulator's compiled code takes minutes, as
-all is compiled anew.
+it: an operator or comparison becomes its opposite, a number grows by a half, a small whole one to
+its successor and one that guards against rounding a thousandfold, a term of a sum or a factor of a
+product is dropped, a condition is turned round. The tests of that file run on a copy of the
+program, without the fault and with it; a fault that they pass is missed, with `--wide` only if all
+tests of their folder pass it too. Faults that change nothing count as missed, so the share is a
+lower bound. Lines for people (messages, descriptions) get no faults. A fault in the simulator's
+compiled code takes minutes, as all is compiled anew.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ OPPOSITES: dict[type[ast.AST], type[ast.AST]] = {
     ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.And: ast.Or, ast.Or: ast.And,
     ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
 }  # fmt: skip
+MANY = 10  # the successor of a whole number from here on is hardly another one
 ROUNDING = 1e-6  # numbers below it guard against rounding: a half more would change nothing
 # Of the tests of a file, and of a folder; a fault that makes them longer is caught.
 LONGEST_S, LONGEST_OF_FOLDER_S = 600.0, 3600.0
@@ -110,7 +111,7 @@ class Faults(ast.NodeTransformer):
         if isinstance(node.value, bool) or not isinstance(node.value, (int, float)):
             return node
         if isinstance(node.value, int):
-            value: float = node.value + 1
+            value: float = node.value + (1 if node.value < MANY else node.value // 2)
         else:
             value = (1e3 if node.value < ROUNDING else 1.5) * node.value or 0.5
         if self._is_chosen(node, f"{node.value} -> {value}"):
