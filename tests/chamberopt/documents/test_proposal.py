@@ -9,9 +9,12 @@ from chamberopt.chamber.layout.balls import SizeFit
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import BallTrial, Proposal, Wanted
 from chamberopt.chamber.propose.proposed_mask import LeftOut
-from chamberopt.design.intensity import PredictedIntensity
+from chamberopt.common.estimate import Estimate
+from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
 from chamberopt.documents.proposal import (
     WIDTH,
+    _in_short,
+    _intensity,
     clauses,
     matter_of,
     proposal_in_words,
@@ -165,3 +168,30 @@ def test_a_time_has_the_unit_of_a_timer() -> None:
 def test_a_mark_may_begin_with_an_article() -> None:
     one = matter_of("A HOLE THROUGH THE WALL, not plugged: close it")
     assert (one.mark, one.text) == ("A HOLE THROUGH THE WALL", ", not plugged: close it.")
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (0.20, "within the usual 0.2 to 0.3"),
+        (0.30, "within the usual 0.2 to 0.3"),
+        (0.10, "below the usual 0.2 to 0.3"),
+        (0.60, "above the usual 0.2 to 0.3"),
+    ],
+)
+def test_an_intensity_is_told_by_its_side_of_the_range(
+    made: Proposal, value: float, words: str
+) -> None:
+    expected = PredictedIntensity.estimated(Estimate(value / 13.5e-3, 0.0))
+    usual = WantedIntensity(0.2, 0.3)
+    told = _intensity(replace(made, expected=expected, usual=usual))
+    assert told == f" Almen intensity about {expected.value:.2g} mmA, {words} mmA."
+    assert _intensity(replace(made, expected=None, usual=usual)) == ""
+    assert _intensity(replace(made, expected=expected, usual=None)).endswith(" mmA.")
+
+
+def test_several_numbered_faces_are_one_list() -> None:
+    assert _in_short("face 1") == "face 1"
+    assert _in_short("face 1, face 2.1") == "faces 1 and 2.1"
+    assert _in_short("face 1, face 6, face 7") == "faces 1, 6 and 7"
+    assert _in_short("face 1, PIN") == "face 1, PIN"

@@ -25,6 +25,7 @@ from chamberopt.peening.strip import (
     GAUGE,
     LENGTH,
     WIDTH,
+    StripCurve,
     StripDents,
     StripSize,
     count_dents,
@@ -259,3 +260,20 @@ def test_a_surface_is_cut_in_pieces_of_neighbours() -> None:
     np.testing.assert_array_equal(cell >= 0, part.target)
     sizes = [np.ptp(middles_of[cell == k], axis=0).max() for k in range(16)]
     assert max(sizes) < 0.8 * np.ptp(middles_of[part.target], axis=0).max()
+
+
+@pytest.mark.parametrize("unit", [1.0, 60.0])
+def test_a_curve_grows_as_its_slope_says_and_saturates_by_its_terms(unit: float) -> None:
+    """Of one term after ln 10 of its times; in another unit of time, as much later."""
+    curve = StripCurve(np.array([2.0, 1.0, 0.5]), np.array([3.0, 0.4, 0.0]) / unit)
+    times = unit * np.geomspace(0.01, 100.0, 9)
+    step = 1e-5
+    slope = (curve.at(times * (1.0 + step)) - curve.at(times * (1.0 - step))) / (2.0 * step)
+    assert curve.growth(times) == pytest.approx(slope, rel=1e-5, abs=1e-9)
+    assert curve.at(1e6 * unit) == pytest.approx(3.0)  # what is never dented adds nothing
+    time = curve.saturation_time()
+    assert curve.at(2.0 * time) == pytest.approx(1.1 * curve.at(time))
+    assert (curve.at(2.2 * time) < 1.1 * curve.at(1.1 * time)).all()
+    one = StripCurve(curve.height[:1], curve.rate[:1])
+    assert one.saturation_time() == pytest.approx(np.log(10.0) / curve.rate[0])
+    assert StripCurve(curve.height[2:], curve.rate[2:]).saturation_time() == 0.0
