@@ -33,6 +33,9 @@ ZONE = "zone"  # a column of both files, in results with zones
 FIXTURES = {"holder": 1, "mask": 2}  # numbers of the cell data "fixture" in chamber.vtp
 FIXTURE_BODY = "{}_points", "{}_triangles"  # field data of chamber.vtp: their closed surfaces
 MM = 1e3
+# VTK's writer of .vtkhdf gives each column of numbers room for 25,000 at least, of 8 bytes. The
+# mesh takes as much as 11 columns.
+COLUMN, OF_MESH = 200_000, 11
 
 Surface = Any
 """A pyvista.PolyData. It is Any, because pyvista's annotations do not fit numpy's."""
@@ -148,8 +151,10 @@ def save_surface(path: Path, surface: Surface) -> None:
         writer.Write()
         write_bytes(path, writer.GetOutputString().encode())
         return
+    values = [*surface.point_data.values(), *surface.cell_data.values()]
+    columns = OF_MESH + sum(one.size // max(1, len(one)) for one in values)
     with new_file(path) as file:
-        file.write(bytes(1024 * (surface.actual_memory_size + 1024)))
+        file.write(bytes(1024 * surface.actual_memory_size + columns * COLUMN))
         file.flush()
         surface.save(file.name)
 

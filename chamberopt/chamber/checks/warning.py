@@ -59,4 +59,4 @@ class DesignWarning:
     @property
     def beginning(self) -> str:
         """The message up to its first comma or place, to be told in another sentence."""
-        return re.split(r",| (?:at|around) \(", self.message, maxsplit=1)[0]
+        return re.split(r",| (?:at|around) \(", self.message)[0]

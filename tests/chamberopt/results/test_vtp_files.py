@@ -3,12 +3,13 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.results.vtp_files import pyvista
+from chamberopt.results.vtp_files import pyvista, save_surface
 
 
 def test_part_file_holds_the_values_of_the_triangles(case: tuple) -> None:
@@ -58,3 +59,27 @@ def test_importing_chamberopt_does_not_import_pyvista() -> None:
     modules = "chamberopt.results.load, chamberopt.workflows.comparison_folder"
     code = f"import sys, {modules}; assert 'pyvista' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, env=dict(os.environ))
+
+
+@pytest.mark.parametrize(("finer", "values", "width"), [(1, 0, 1), (1, 3, 1), (5, 1, 20)])
+def test_room_for_a_file_is_there_before_vtk_writes_it(
+    finer: int, values: int, width: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ball, rng = pyvista().wrap(trimesh.creation.icosphere(finer)), np.random.default_rng(0)
+    for number in range(values):
+        ball.cell_data[f"value {number}"] = rng.random((ball.n_cells, width)).squeeze()
+    reserved: list[int] = []
+    save = type(ball).save
+
+    def saved(surface: object, name: str) -> None:
+        reserved.append(Path(name).stat().st_size)
+        save(surface, name)
+
+    monkeypatch.setattr(type(ball), "save", saved)
+    for suffix in ("vtkhdf", "vtp"):
+        save_surface(tmp_path / f"ball.{suffix}", ball)
+        read = pyvista().read(tmp_path / f"ball.{suffix}")
+        for name in ball.cell_data:
+            np.testing.assert_array_equal(read.cell_data[name], ball.cell_data[name])
+    (room,) = reserved
+    assert 1.0 <= room / (tmp_path / "ball.vtkhdf").stat().st_size < 2.0

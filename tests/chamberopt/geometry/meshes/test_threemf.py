@@ -9,6 +9,7 @@ import trimesh
 
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.meshes.part_mesh import read_part
+from chamberopt.geometry.meshes.threemf import _copies
 from tests.helpers.mesh_files import SIDES, named_area, volume
 
 
@@ -39,3 +40,20 @@ def test_a_3mf_is_read_where_lxml_is_there(tmp_path: Path) -> None:
     trimesh.creation.box((20, 20, 20)).export(path)
 
     assert read_part(path, "mm").size == pytest.approx([0.02] * 3)
+
+
+def test_bodies_are_counted_in_the_largest_object_also_where_objects_repeat_objects() -> None:
+    def model(*objects: tuple[int, ...]) -> bytes:
+        """Objects numbered from 1, each of which repeats others; one without any is a body."""
+        return "".join(
+            f'<object id="{number}">'
+            + "".join(f'<component objectid="{one}"/>' for one in repeated)
+            + "</object>"
+            for number, repeated in enumerate(objects, start=1)
+        ).encode()
+
+    assert _copies(b"") == 0
+    assert _copies(model((), (1, 1, 1))) == 3
+    assert _copies(model((), (1, 1), (2, 2, 1), (2,))) == 5
+    assert _copies(model((), *(((number, number)) for number in range(1, 31)))) == 2**30
+    assert _copies(model((), *(((number, number)) for number in range(1, 3000)))) >= 2**60
