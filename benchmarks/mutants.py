@@ -10,8 +10,9 @@ its successor and one that guards against rounding a thousandfold, a term of a s
 product is dropped, a condition is turned round. The tests of that file run on a copy of the
 program, without the fault and with it; a fault that they pass is missed, with `--wide` only if all
 tests of their folder pass it too. Faults that change nothing count as missed, so the share is a
-lower bound. Lines for people (messages, descriptions) get no faults. A fault in the simulator's
-compiled code takes minutes, as all is compiled anew.
+lower bound. Lines for people (messages, descriptions), and what says how lines and legends of a
+drawing look, get no faults. A fault in the simulator's compiled code takes minutes, as all is
+compiled anew.
 """
 
 from __future__ import annotations
@@ -35,6 +36,11 @@ OPPOSITES: dict[type[ast.AST], type[ast.AST]] = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Lt: ast.GtE,
     ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.And: ast.Or, ast.Or: ast.And,
     ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
+}  # fmt: skip
+# Arguments of drawings: how thick lines are and where a legend stands is seen, and not tested.
+LOOKS = {
+    "lw", "ls", "line_width", "ms", "mew", "point_size", "capsize", "linespacing", "handlelength",
+    "bbox_to_anchor", "label_font_size", "arrowprops",
 }  # fmt: skip
 MANY = 10  # the successor of a whole number from here on is hardly another one
 ROUNDING = 1e-6  # numbers below it guard against rounding: a half more would change nothing
@@ -80,6 +86,9 @@ class Faults(ast.NodeTransformer):
             node.func = self.visit(node.func)
             return node  # any length below 0 is one that numpy finds
         return self.generic_visit(node)
+
+    def visit_keyword(self, node: ast.keyword) -> ast.AST:
+        return node if node.arg in LOOKS else self.generic_visit(node)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         self.generic_visit(node)

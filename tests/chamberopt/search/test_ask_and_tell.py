@@ -11,10 +11,11 @@ import chamberopt
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.common.executor import SerialExecutor
+from chamberopt.search.ask_and_tell import most_evaluations
 from chamberopt.search.run_sweep import plan_sweep
 from chamberopt.search.study import Study
 from tests.helpers.known_optima import GEAR, NO_FRILLS, VARY, bowl, bowl_shares
-from tests.helpers.studies import run_in_folder
+from tests.helpers.studies import assert_total_never_grows, run_in_folder
 from tests.helpers.synthetic import judged
 
 ROOT = Path(__file__).parents[3]
@@ -211,3 +212,18 @@ def test_a_sweep_asks_for_its_list() -> None:
     for candidate in asked:
         search.tell(candidate, {"uniform_coverage": measure(candidate)})
     assert len(search.trials) == len(points) == 9
+
+
+def test_no_more_is_done_than_was_evaluated() -> None:
+    told: list[tuple[int, int, float | None]] = []
+    search = chamberopt.Search(study(), progress=lambda *now: told.append(now))
+    seen = []
+    while (candidate := search.ask()) is not None:
+        search.tell(candidate, {"uniform_coverage": measure(candidate)})
+        seen.append((len(search.trials), told[-1][0]))
+    assert all(0 < done <= evaluated for evaluated, done in seen)
+    assert_total_never_grows(told)
+    searched = sum(one.stage == "search" for one in search.trials)
+    assert (searched, told[0][1]) == (12, most_evaluations(study()))
+    best = [one for *_, one in told[:searched]]
+    assert best == [max(one.score for one in search.trials[:k]) for k in range(1, searched + 1)]
