@@ -1,12 +1,24 @@
 """A convergence study keeps to its budget of CPU seconds, and to the time by the clock."""
 
+from contextlib import nullcontext
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
+from chamberopt.chamber.build import build_chamber
+from chamberopt.common import memory
+from chamberopt.common.errors import InputError
 from chamberopt.common.executor import SerialExecutor
+from chamberopt.coverage.field.memory import PROCESS, evaluation_bytes
 from chamberopt.simulation import convergence
-from chamberopt.simulation.convergence import MIN_REPLICAS, SERIAL, describe_cost
+from chamberopt.simulation.convergence import (
+    LIKELY_REPLICAS,
+    MIN_REPLICAS,
+    SERIAL,
+    describe_cost,
+    require_memory,
+)
 from tests.helpers.synthetic import plate_design
 
 CPU_S = 0.5  # of each made-up replica
@@ -57,3 +69,15 @@ def test_the_fewest_replicas_are_simulated_however_late(monkeypatch: pytest.Monk
 def test_the_time_is_stated_before(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(convergence, "core_count", lambda: 2)
     assert "at most about 120 CPU s (--budget-s), and 66 s on 2 cores" in describe_cost(BUDGET)
+
+
+def test_replicas_that_do_not_fit_into_memory_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half of what is free may be taken: by the process, by one replica's work, and by fields."""
+    design = plate_design()
+    chamber = build_chamber(design)
+    fields: Any = [SimpleNamespace(setting=SimpleNamespace(points=k)) for k in (10**6, 2 * 10**6)]
+    needed = PROCESS + 250.0 * 3e6 + evaluation_bytes(design, chamber, LIKELY_REPLICAS)
+    for share, is_refused in ((0.999, True), (1.001, False)):
+        monkeypatch.setattr(memory, "free_memory", lambda share=share: 2.0 * share * needed)
+        with pytest.raises(InputError, match="memory") if is_refused else nullcontext():
+            require_memory(fields, design, chamber)

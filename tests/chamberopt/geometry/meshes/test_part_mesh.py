@@ -159,3 +159,13 @@ def test_normals_of_the_file_stay_at_their_corners_whichever_way_a_triangle_is_t
     same = (corner[:, :, None] == corners[:, None]).all(axis=3)  # of the file's, (m, 3, 3)
     assert (same.sum(axis=(1, 2)) == 3).all()
     np.testing.assert_allclose(part.normals, np.einsum("mab,mbi->mai", same, wanted))
+
+
+def test_minus_zero_is_the_place_of_zero(tmp_path: Path) -> None:
+    corners = box_corners()
+    corners[corners == corners.min()] = 0.0
+    every_second = np.arange(len(corners)) % 2 == 0
+    signed = np.where((corners == 0.0) & every_second[:, None, None], -0.0, corners)
+    part = read_part(write_stl(tmp_path / "box.stl", signed), "mm")
+    assert len(part.vertices) == 8
+    assert not np.signbit(part.vertices).any()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from chamberopt.search.optimiser.acquisition import (
+    _choices,
     _knowledge_gradient,
     possible_gain,
     propose_point,
@@ -170,3 +171,22 @@ def test_what_geometry_refuses_does_not_depend_on_the_mass(by_geometry: bool) ->
     assert light > 0.9
     assert (heavy > 0.9) is by_geometry  # else either coordinate may be the reason
     assert (far < 0.1) is by_geometry
+
+
+def test_choices_are_round_the_leaders_and_anywhere() -> None:
+    """Five leaders in the middle: half of their choices are 0.03 away in each number, half 0.1."""
+    rng = np.random.default_rng(6)
+    middle, rest = 0.5 + 1e-3 * rng.random((5, 3)), rng.choice([0.05, 0.95], (20, 3))
+    model = model_of(np.vstack([middle, rest]), np.r_[np.ones(5), np.zeros(20)])
+    choices = _choices(model, np.random.default_rng(0))
+    spread = len(choices) - 500
+    away = choices[:500] - 0.5
+    assert np.abs(away.mean(axis=0)).max() < 0.02
+    assert away.std() == pytest.approx(np.sqrt(0.5 * (0.03**2 + 0.1**2)), rel=0.1)
+    of_point = np.abs(away).mean(axis=1)
+    assert (of_point > 0.12).mean() < 0.2 < (of_point < 0.03).mean()
+    assert choices.min() >= 0.0
+    assert choices.max() <= 1.0
+    anywhere = choices[-spread:]
+    assert np.abs(anywhere.mean(axis=0) - 0.5).max() < 0.01
+    assert anywhere.std() == pytest.approx(np.sqrt(1.0 / 12.0), rel=0.02)
