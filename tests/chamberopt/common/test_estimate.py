@@ -6,7 +6,17 @@ import math
 import numpy as np
 import pytest
 
-from chamberopt.common.estimate import Estimate, estimate, independent_difference, paired_difference
+from chamberopt.common.estimate import (
+    Estimate,
+    estimate,
+    independent_difference,
+    jackknife,
+    normal_quantile,
+    paired_difference,
+    student_quantile,
+    sum_of_shared,
+    welch_half_width,
+)
 
 
 def test_differences() -> None:
@@ -72,3 +82,76 @@ def test_an_estimate_comes_back_from_json() -> None:
     without_dents = estimate([0.0, 0.0, 0.0], bias=math.inf)
     written = json.dumps(without_dents.to_json(), allow_nan=False)
     assert Estimate.from_json(json.loads(written)) == without_dents
+
+
+def test_an_interval_is_that_of_student_with_the_shared_errors_and_the_bias() -> None:
+    """Of three values with s = 1: t of two degrees of freedom is 4.303, over sqrt(3)."""
+    scatter, wide = 4.30265 / math.sqrt(3.0), 1.959964 * 5.0
+    assert normal_quantile(0.95) == pytest.approx(1.959964)
+    assert student_quantile(2) == pytest.approx(4.30265)
+    values = [1.0, 2.0, 3.0]
+    assert estimate(values).half_width == pytest.approx(scatter)
+    found = estimate(values, bias=0.5, shared=(3.0, -4.0))
+    assert found.value == 2.0
+    assert found.half_width == pytest.approx(math.hypot(scatter, wide) + 0.5)
+    assert found.beyond_scatter == pytest.approx(0.5)
+    assert (found.low, found.high) == pytest.approx(
+        (2.0 - found.half_width, 2.0 + found.half_width)
+    )
+    later = estimate(values, bias=0.5, shared=(3.0,)).with_shared(3, [-4.0])
+    assert later.shared == (3.0, 0.0, 0.0, -4.0)
+    assert later.half_width == pytest.approx(found.half_width)
+    twice = found.times(2.0)
+    assert (twice.value, twice.half_width, twice.bias) == pytest.approx(
+        (4.0, 2.0 * found.half_width, 1.0)
+    )
+    assert twice == estimate(twice.pseudovalues, bias=1.0, shared=twice.shared)
+    with pytest.raises(ValueError, match="2 shared errors, at most 1"):
+        found.with_shared(1, [1.0])
+    clipped = estimate([0.8, 1.0, 1.4], highest=1.0)  # its pseudo-values move with it
+    assert np.mean(clipped.pseudovalues) == pytest.approx(1.0)
+
+
+def test_an_interval_is_widened_and_never_narrowed() -> None:
+    one = Estimate(2.0, 0.5)
+    assert one.at_least_as_wide(0.4) == one
+    assert one.at_least_as_wide(0.6) == Estimate(2.0, 0.6)
+    assert Estimate(0.0, 0.0).at_least_as_wide(0.6) == Estimate(0.0, 0.0)
+    assert Estimate(2.0, 0.0).at_least_as_wide(0.6) == Estimate(2.0, 0.6)
+
+
+def test_errors_by_common_causes_cancel_in_a_difference() -> None:
+    one, other = estimate([1.0, 2.0, 3.0], shared=(3.0, 1.0)), estimate([0.0, 0.1], shared=(3.0,))
+    assert sum_of_shared([(2.0, one), (-1.0, other)]) == (3.0, 2.0)
+    gap = independent_difference(one, other)
+    assert gap.shared == (0.0, 1.0)
+    welch = welch_half_width(one.pseudovalues, other.pseudovalues)
+    assert gap.half_width == pytest.approx(math.hypot(welch, normal_quantile(0.95)))
+    rough = independent_difference(Estimate(1.0, 3.0), Estimate(0.2, 4.0))
+    assert (rough.value, rough.half_width) == pytest.approx((0.8, 5.0))
+
+
+def test_welchs_interval_is_students_for_samples_alike() -> None:
+    """Two samples of n with one variance have 2 n - 2 degrees of freedom, an error s sqrt(2/n)."""
+    sample = np.array([1.0, 2.0, 4.0, 7.0])
+    error = np.std(sample, ddof=1) * math.sqrt(2.0 / 4.0)
+    assert welch_half_width(sample, sample + 9.0) == pytest.approx(student_quantile(6) * error)
+    larger = welch_half_width(sample, sample, times=4.0)
+    assert larger == pytest.approx(student_quantile(30) * error / 2.0)
+    # One sample without scatter adds nothing.
+    assert welch_half_width(sample, [3.0, 3.0]) == pytest.approx(
+        student_quantile(3) * np.std(sample, ddof=1) / 2.0
+    )
+
+
+def test_pseudo_values_of_a_mean_are_the_values_and_theirs_have_the_mean_of_all() -> None:
+    sample = np.array([1.0, 2.0, 4.0, 7.0])
+    left_out = [np.delete(sample, k) for k in range(4)]
+    np.testing.assert_allclose(
+        jackknife(np.array([sample.mean(), *(one.mean() for one in left_out)])), sample
+    )
+    cubes = np.array([sample.mean() ** 3, *(one.mean() ** 3 for one in left_out)])
+    found = jackknife(cubes)
+    assert found.mean() == pytest.approx(cubes[0])
+    assert np.diff(found) == pytest.approx(-3.0 * np.diff(cubes[1:]))
+    assert jackknife(np.array([5.0, 4.0])).tolist() == [5.0]

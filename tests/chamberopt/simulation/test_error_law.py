@@ -1,5 +1,7 @@
 """Errors of batches and the power law through them, on noise whose truth is known."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -81,3 +83,20 @@ def test_batches_with_too_few_dents_are_left_out_of_the_law() -> None:
         BatchSize(one.replicas, one.batches, one.rms, one.half_width, one.cpu_s) for one in only
     ]
     assert fit_error_law(only) == fit_error_law(resolved)
+
+
+def test_the_power_of_the_law_has_the_interval_of_its_scatter() -> None:
+    """Between two sizes: the standard deviation of the slope is that of both ends over the way."""
+    sizes = [
+        BatchSize(1, batches, error, 0.0, cost)
+        for cost, batches, error in ((1.0, 9, 2.0), (math.e**2, 5, 1.0))
+    ]
+    law = fit_error_law(sizes)
+    sd = math.sqrt(1.0 / (2.0 * 8.0) + 1.0 / (2.0 * 4.0)) / 2.0
+    assert law.power == pytest.approx(0.5 * math.log(sizes[0].error / sizes[1].error))
+    assert law.half_width == pytest.approx(NORMAL * sd)
+
+
+def test_the_interval_of_an_error_of_two_batches_is_that_of_a_squared_normal_number() -> None:
+    """Of one degree of freedom: chi-square is the square of z, at 0.9875 and 0.5125."""
+    assert rms_interval(3.0, 2) == pytest.approx((3.0 / 2.241403, 3.0 / 0.031338), rel=1e-4)
