@@ -6,7 +6,16 @@ import pytest
 
 from chamberopt.common.estimate import Estimate
 from chamberopt.documents.coverage import labels_of
-from chamberopt.documents.wording import Label, objective_label, plain, with_interval
+from chamberopt.documents.document import Table
+from chamberopt.documents.wording import (
+    Label,
+    energy_lines,
+    keys_in_words,
+    objective_label,
+    plain,
+    with_interval,
+)
+from chamberopt.results.impact_energy import ImpactEnergy, SurfaceEnergy
 
 
 @pytest.mark.parametrize(
@@ -76,3 +85,30 @@ def test_an_objective_of_one_figure_has_its_words_and_stands_once() -> None:
     assert [*labels] == [goal, "mean_coverage"]
     assert labels[goal].with_unit == "time until 95 % of the area is 98 % covered [s]"
     assert labels[goal].factor == -1.0
+
+
+def test_energy_is_told_a_surface_with_its_share_of_all() -> None:
+    """2 W on 40 cm² are 50 mW/cm²; balls on one another have no area."""
+
+    def one(name: str, area: float, power: float, lost: float) -> SurfaceEnergy:
+        return SurfaceEnergy(
+            name, area, Estimate(1234.0, 0.0), Estimate(power, 0.0), Estimate(lost, 0.1 * lost)
+        )
+
+    surfaces = one("the part", 4e-3, 2.0, 0.75), one("balls", math.nan, 1.0, 0.25)
+    table, note = energy_lines(ImpactEnergy(0.5, surfaces, ()))
+    assert isinstance(table, Table)
+    assert list(table.rows) == [
+        ("the part", "4000", "1234", "50", "750 ± 80", "75"),
+        ("balls", "", "1234", "", "250 ± 25", "25"),
+        ("all", "", "", "", "1000", "100"),
+    ]
+    assert "by tenths of 0.5 s" in str(note)
+    nothing, _ = energy_lines(ImpactEnergy(0.5, (one("the part", 4e-3, 0.0, 0.0),), ()))
+    assert isinstance(nothing, Table)
+    assert nothing.rows[0][-1] == ""
+
+
+def test_keys_of_files_become_words_and_names_of_files_stay() -> None:
+    text = "raise process.accuracy.simulated_time_s of part.stl"
+    assert keys_in_words(text) == "raise simulated time of the accuracy of the process of part.stl"
