@@ -8,6 +8,8 @@ import shutil
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import Estimate, estimate
 from chamberopt.coverage.metrics import NEVER, find_metric
-from chamberopt.coverage.stress_knowledge import BANDS
+from chamberopt.coverage.stress_knowledge import BANDS, stress_bands
 from chamberopt.design.calibration import Calibration, LawCalibration, Misfit, law_metal
 from chamberopt.design.load import load_design
 from chamberopt.documents.comparison import after_shorter_time, comparison_end, comparison_lines
@@ -26,7 +28,7 @@ from chamberopt.page.acts import list_results
 from chamberopt.printers import terminal
 from chamberopt.results.arrays_file import ResultArrays
 from chamberopt.results.command_records import difference_record
-from chamberopt.results.compare.comparison import Comparison, compare, coverage_after
+from chamberopt.results.compare.comparison import Comparison, _by_the_law, compare, coverage_after
 from chamberopt.results.compare.difference import MAX_TIME_RATIO, confidence_of_each, difference
 from chamberopt.results.load import load_result
 from chamberopt.simulation.evaluation import Evaluation
@@ -387,3 +389,16 @@ def test_results_of_different_times_are_compared_after_the_shorter(tmp_path: Pat
     assert "simulate it again" in remedy
     with pytest.raises(InputError, match="cannot be compared"):
         compare([short, long])
+
+
+def test_the_law_may_be_wrong_by_its_band_in_each_figure_that_it_gives() -> None:
+    design = plate_design().changed({"materials.part": {"alloy": "7075-T6"}, "stress": {}})
+    bands = stress_bands(design)
+    assert bands
+    for name, band in bands.items():
+        for metric in (name, f"left.{name}"):
+            like: Any = SimpleNamespace(
+                design=design, objective_name="other", metrics={metric: Estimate(-3.0, 0.1)}
+            )
+            assert _by_the_law(metric, like) == pytest.approx(3.0 * (band - 1.0))
+    assert _by_the_law("mean_coverage", like) == 0.0
