@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from chamberopt.geometry.heights import INSIDE, lowest_over
+from chamberopt.geometry.heights import INSIDE, lowest_over, points_up_to
 
 SQUARE = 5e-3 * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]], dtype=float)
 NEAR = 4.0 * INSIDE
@@ -47,3 +47,18 @@ def test_of_a_ball_the_rim_counts_or_its_lowest_point() -> None:
     beside = ball.copy()
     beside.apply_translation((8e-3, 0.0, 0.0))  # the outline ends 3 mm before its middle
     assert _over(beside) == pytest.approx(-math.sqrt(1e-4 - 9e-6), abs=2e-5)
+
+
+@pytest.mark.parametrize("level", [-0.4, 0.0, 0.3])
+def test_of_a_cone_what_is_below_a_level_is_a_frustum(level: float) -> None:
+    """Its radius falls by half of the height, from 1 at -1 to 0 at 1."""
+    cone = trimesh.creation.cone(1.0, 2.0, sections=64)
+    cone.apply_translation((0.0, 0.0, -1.0))
+    points = points_up_to(np.asarray(cone.vertices), np.asarray(cone.faces), level)
+    assert points[:, 2].max() == pytest.approx(level)
+    assert points[:, 2].min() == pytest.approx(-1.0)
+    rim = points[np.isclose(points[:, 2], level)]
+    assert len(rim) == 64
+    assert np.hypot(*rim.T[:2]) == pytest.approx(0.5 * (1.0 - level))
+    whole = points_up_to(np.asarray(cone.vertices), np.asarray(cone.faces), 1.0)
+    np.testing.assert_array_equal(whole, cone.vertices)

@@ -12,6 +12,7 @@ from chamberopt.peening.posterior import (
     Prior,
     explaining_posterior,
     find_posterior,
+    fit_surface,
 )
 
 NAMES: tuple[Parameter, ...] = ("amplitude", "v0", "K")
@@ -83,3 +84,28 @@ def test_errors_grow_where_less_than_one_case_in_twenty_scatters_so(
     assert one.chi2 == pytest.approx(chi2, rel=1e-3)
     assert one.values == 4
     assert one.error_scale == pytest.approx(1.0 if is_explained else np.sqrt(chi2 / 4.0), rel=1e-3)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_quadratic_polynomial_is_fitted_as_it_is_where_there_is_no_noise(count: int) -> None:
+    rng = np.random.default_rng(count)
+    centre, slope = rng.normal(size=count), rng.normal(size=count)
+    bend = rng.normal(size=(count, count))
+
+    def value(place: np.ndarray) -> float:
+        off = place - centre
+        return float(2.0 + slope @ off + off @ bend @ off)
+
+    places = centre + rng.normal(0.0, 0.1, (40, count))
+    exact = fit_surface(places, centre, noise=1e-4)
+    for place in centre + rng.normal(0.0, 0.1, (5, count)):
+        found = exact.weights(place) @ [value(one) for one in places]
+        assert found == pytest.approx(value(place), abs=1e-3)
+
+
+def test_the_noise_of_many_runs_at_one_place_is_that_of_their_mean() -> None:
+    """The polynomial's weights there are equal."""
+    centre = np.zeros(2)
+    near = fit_surface(np.zeros((25, 2)), centre, noise=0.1)
+    assert near.weights(centre) == pytest.approx(np.full(25, 0.04), rel=1e-2)
+    assert near.noise(centre) == pytest.approx(0.04, rel=1e-2)

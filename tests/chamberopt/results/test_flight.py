@@ -1,6 +1,9 @@
 """Every ball is where the simulation has it at the time of the frame."""
 
+from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +11,12 @@ import pytest
 from chamberopt.common.errors import InputError
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE
 from chamberopt.pictures.film import rotation_about_line
-from chamberopt.results.flight import face_displacement, rotation_angle, simulate_flight
+from chamberopt.results.flight import (
+    face_displacement,
+    require_simulated,
+    rotation_angle,
+    simulate_flight,
+)
 from chamberopt.results.load import Result
 from chamberopt.results.rebuild import RebuiltReplica, rebuild_replica
 from sim_core import Balls, Gravity, PartRotation, Physics, Scene, simulate
@@ -124,3 +132,22 @@ def test_what_was_not_simulated_is_not_shown(
 ) -> None:
     with pytest.raises(InputError, match=said):
         simulate_flight(replica, start, span, frames)
+
+
+def test_frames_lie_in_the_recorded_time_and_are_not_too_many() -> None:
+    scene: Any = SimpleNamespace(duration=2.0, balls=range(1000))
+    for start, span, frames, trail, wrong in (
+        (0.0, 2.0, 2, 4, None),
+        (1.5, 0.5, 2000, 4, None),
+        (2.0, 1e-3, 2, 4, "--from-s: given 2; the replica was simulated from 0 to 2 s"),
+        (-0.1, 1e-3, 2, 4, "--from-s"),
+        (1.5, 0.51, 2, 4, "--span-ms: given 510; from 1.5 s on, 500 ms were simulated"),
+        (0.0, 0.9e-6, 2, 4, "--span-ms"),
+        (0.0, 1e-6, 2, 4, None),
+        (0.0, 1.0, 1, 4, "--frames: given 1; 2 to 2000"),
+        (0.0, 1.0, 2001, 4, "--frames: given 2001; 2 to 2000"),
+        (0.0, 1.0, 1000, 10, None),
+        (0.0, 1.0, 1001, 10, "at most 1000 are supported"),
+    ):
+        with pytest.raises(InputError, match=wrong) if wrong else nullcontext():
+            require_simulated(scene, start, span, frames, trail)

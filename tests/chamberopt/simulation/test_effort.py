@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from chamberopt.common.estimate import Estimate, estimate, shared_half_width
-from chamberopt.simulation.effort import MIN_REPLICAS_TO_STOP, Effort, Step, narrows
+from chamberopt.simulation.effort import (
+    MIN_REPLICAS_TO_STOP,
+    Effort,
+    Step,
+    _growth,
+    narrows,
+    points_remedy,
+)
 
 ASKED = Effort(first=10, most=200, points=20_000, wanted=0.01)
 
@@ -109,3 +116,21 @@ def test_an_end_after_few_replicas_keeps_the_95_percent(shared: float) -> None:
             got = estimate(sample, shared=[shared])
         held += got.low <= 0.0 <= got.high
     assert 0.93 <= held / runs <= 0.97, held / runs
+
+
+@pytest.mark.parametrize("unit", [1.0, 100.0])
+def test_points_are_raised_by_the_square_of_what_their_choice_is_too_much(unit: float) -> None:
+    """Seven eighths of the wanted half-width may be of their choice."""
+    shared, wanted = 0.0175 * unit, 0.01 * unit
+    remedy = points_remedy(20_000, shared, wanted)
+    assert remedy == "raise process.accuracy.points from 20,000 to about 80,000"
+    assert "to about 20,000" in points_remedy(20_000, 0.5 * shared, wanted)
+    assert points_remedy(300_000, shared, wanted).startswith("not even 1,000,000 points")
+
+
+def test_replicas_narrow_the_scatter_alone() -> None:
+    """Four times as many halve it, beside what they share."""
+    assert _growth(0.2, 0.0, 0.1) == pytest.approx(4.0)
+    wide, shared = math.hypot(0.2, 0.03), 0.03
+    assert _growth(wide, shared, math.hypot(0.1, shared)) == pytest.approx(4.0)
+    assert _growth(wide, shared, shared) == math.inf

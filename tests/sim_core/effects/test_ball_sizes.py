@@ -4,6 +4,7 @@ energy.
 
 import math
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 
 import numpy as np
 import pytest
@@ -23,6 +24,13 @@ from sim_core import (
     pack_balls,
     simulate,
 )
+from sim_core.effects.ball_sizes import (
+    least_share_by_mass,
+    new_ball_sizes,
+    reach_of_pair,
+    share_by_mass,
+)
+from sim_core.numerics.vec3 import Vec3
 from sim_core.scene.invariants import clearance, contained, energy, momentum, narrowest_gap
 from tests.helpers.scenes.cavities import (
     FLOOR,
@@ -230,3 +238,20 @@ def test_a_mixed_ball_that_overlaps_is_named() -> None:
             Physics(),
             1.0,
         )
+
+
+def test_a_collision_is_shared_out_by_mass() -> None:
+    """Momentum is kept, and of equal masses each takes its own change."""
+    change = Vec3(1.0, -2.0, 0.5)
+    balls = Balls(np.arange(9.0).reshape(3, 3), np.zeros((3, 3)), SIZES, np.array([7.8e3] * 3))
+    sizes = new_ball_sizes(balls, np.arange(3), np.arange(3), np.zeros(3))
+    assert sizes is not None
+    for one, two in product(range(3), repeat=2):
+        of_one, of_two = (share_by_mass(sizes, *pair, change) for pair in ((one, two), (two, one)))
+        for k in range(3):
+            assert sizes.mass[one] * of_one[k] == pytest.approx(sizes.mass[two] * of_two[k])
+            assert of_one[k] + of_two[k] == pytest.approx(2.0 * change[k])
+        assert least_share_by_mass(sizes, one, two) == pytest.approx(min(of_one.x, of_two.x))
+        apart = 0.5 * (SIZES[one] + SIZES[two])
+        assert reach_of_pair(sizes, 1.0, one, two) == pytest.approx(apart)
+        assert reach_of_pair(sizes, 0.0, one, two) == 0.0
