@@ -5,9 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chamberopt.chamber.layout.end import DEEP
 from chamberopt.chamber.layout.target import Surface
 from chamberopt.chamber.propose import proposed_clamp
-from chamberopt.chamber.propose.proposed_clamp import _clamp, _is_cut_all_round, bore_clearance_mm
+from chamberopt.chamber.propose.proposed_clamp import (
+    FREE,
+    OFF_AXIS,
+    _clamp,
+    _is_cut_all_round,
+    bore_clearance_mm,
+    why_not_turned,
+)
 from chamberopt.design.fixture import tight_gap_mm
 
 
@@ -68,3 +76,48 @@ def test_a_wall_is_cut_out_no_wider_than_its_sheet_allows(ball_mm: float, cleara
     given = bore_clearance_mm(1e-3 * ball_mm)
     assert given == clearance
     assert given <= min(tight_gap_mm(ball_mm), 0.25 * ball_mm)
+
+
+TURNED = np.roll(np.eye(3), 1, axis=0)  # x to y, y to z, z to x
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), TURNED, -np.eye(3)])
+@pytest.mark.parametrize(
+    ("reach", "aside", "beyond", "form", "why"),
+    [
+        (-1e-6, 0.0, 1.01 * DEEP, "round", ""),
+        (1e-6, 0.0, 1.01 * DEEP, "round", "nearer to a wall"),
+        (-1e-6, 0.99 * OFF_AXIS, 1.01 * DEEP, "round", ""),
+        (-1e-6, 1.01 * OFF_AXIS, 1.01 * DEEP, "round", "not round"),
+        (-1e-6, 0.0, 0.99 * DEEP, "round", "none of its ends"),
+        (-1e-6, 0.0, 1.01 * DEEP, "long", "not round"),
+    ],
+)
+def test_a_part_turns_where_it_is_round_held_and_clear_of_the_walls(
+    turn: np.ndarray, reach: float, aside: float, beyond: float, form: str, why: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """A part along an axis 10 mm from the nearest wall; what is outside of the room may be wide."""
+    ball, at = 2e-3, np.array([0.0, 1e-3, 10e-3])
+    radius = 10e-3 + reach - FREE * ball
+    ring = np.array([[0.0, 0.6, 0.8], [0.0, -1.0, 0.0]])
+    inside = at + np.vstack([radius * ring, radius * ring + [15e-3, 0.0, 0.0]])
+    part = np.vstack([inside, at + [50e-3, 0.0, 0.0] + 30e-3 * ring])
+    room = np.array([[-20e-3, -11e-3, 0.0], [20e-3, 12e-3, 21e-3]])
+    openings = [
+        SimpleNamespace(place=turn @ np.add(at, [20e-3, aside, 0.0]), form=form, beyond=beyond),
+        SimpleNamespace(place=turn @ np.add(at, [-20e-3, 0.0, 0.0]), form="round", beyond=0.0),
+    ]
+    for way in (1.0, -1.0):
+        line = turn @ at, way * turn @ [1.0, 0.0, 0.0]
+        monkeypatch.setattr(proposed_clamp, "turning_axis", lambda *_, line=line: line)
+        monkeypatch.setattr(proposed_clamp, "find_openings", lambda _: openings)
+        chamber = SimpleNamespace(
+            vertices=room @ turn.T, part=SimpleNamespace(vertices=part @ turn.T)
+        )
+        shot = SimpleNamespace(shot=SimpleNamespace(diameters=(1e-3, ball)))
+        found = why_not_turned(SimpleNamespace(chamber=chamber, design=shot))
+        assert why in found
+        assert bool(why) == bool(found)
+    monkeypatch.setattr(proposed_clamp, "turning_axis", lambda *_: None)
+    assert why_not_turned(SimpleNamespace(chamber=chamber, design=shot)) == "no axis is given"
