@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from chamberopt.chamber.bores_and_deflectors import first_crossings
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.scene import balls_can_rest, build_scene, chamber_mesh, scene_physics
 from chamberopt.common.errors import InputError
@@ -20,6 +21,7 @@ from chamberopt.design.shapes import (
     further_sonotrode_tag,
     is_sonotrode,
 )
+from chamberopt.geometry.solids import SolidSurface
 from chamberopt.geometry.triangles import area_vectors, areas
 from chamberopt.simulation.resting_balls import find_resting_balls
 from sim_core import Resting, Vibration
@@ -572,3 +574,25 @@ def test_the_sides_of_a_plate_vary() -> None:
         match=r"size_mm: given \[10.0, 8.0, 0.0\]; each side must be from 0.1 to 2000 mm",
     ):
         asked.changed({"chamber.deflectors.0.size_mm.2": 0.0})
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_lines_cross_a_box_where_it_begins_and_ends(unit: float) -> None:
+    """From the left of a box from 1 to 3, within it, along its edge and past it."""
+    box = trimesh.creation.box(bounds=unit * np.array([[1.0, 0, 0], [3, 1, 1]]))
+    count = len(box.faces)
+    surface = SolidSurface(
+        np.asarray(box.vertices), np.asarray(box.faces), np.zeros(count, int), np.zeros(count, int)
+    )
+    points = unit * np.array([
+        [0.0, 0.3, 0.4], [2.0, 0.3, 0.4], [0, 0, 0], [0, 1.01, 0.5], [4, 0.5, 0.5],
+    ])  # fmt: skip
+    right = np.array([1.0, 0.0, 0.0])
+    distance, is_inwards = first_crossings(surface, points, right, 0.0)
+    assert distance / unit == pytest.approx([1.0, 1.0, 1.0, np.inf, np.inf])
+    assert is_inwards[:3].tolist() == [True, False, True]
+    later, is_inwards = first_crossings(surface, points, right, 1.5 * unit)
+    assert later / unit == pytest.approx([3.0, np.inf, 3.0, np.inf, np.inf])
+    assert not is_inwards[0]
+    back, is_inwards = first_crossings(surface, points[-1:], -right, 0.0)
+    assert (back[0] / unit, is_inwards[0]) == (pytest.approx(1.0), True)

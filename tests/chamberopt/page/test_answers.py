@@ -12,6 +12,7 @@ from chamberopt.design.design import Design
 from chamberopt.geometry.triangles import unit_normals
 from chamberopt.page.answers import (
     check_answers,
+    packed,
     part_answer,
     shape_answer,
     step_texts,
@@ -69,3 +70,25 @@ def test_what_is_outside_the_chamber_stands_before_other_warnings(tmp_path: Path
         head = json.loads(answer[4 : 4 + int.from_bytes(answer[:4], "little")])
         assert len(head["unpeened"]) == count, (head["unpeened"], head["warnings"])
         assert all(one not in head["warnings"] for one in head["unpeened"])
+
+
+@pytest.mark.parametrize("text", ["", "a", "ab", "abc"])
+def test_packed_arrays_begin_at_words_and_are_read_as_the_page_does(text: str) -> None:
+    given = {
+        "marks": np.array([1, 2, 3], dtype=np.uint8),
+        "places": np.array([[0.5, -1.5], [2.0, 1e-3]]),
+        "numbers": np.array([7, 8, 2**31], dtype=np.int64),
+        "none": np.zeros((0, 3)),
+    }
+    content = packed({"text": text}, **given)
+    length = int.from_bytes(content[:4], "little")
+    assert length % 4 == 0
+    head = json.loads(content[4 : 4 + length])
+    assert head["text"] == text
+    at = 4 + length
+    for name, values in given.items():
+        kind, count = head["arrays"][name]
+        found = np.frombuffer(content, np.dtype(kind), count, at)
+        assert found == pytest.approx(values.ravel())
+        at += -(-found.nbytes // 4) * 4
+    assert at == len(content)
