@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from sim_core import (
@@ -26,6 +27,7 @@ from sim_core import (
     Vibration,
     simulate,
 )
+from sim_core.effects.drag import drag_coefficient, new_drag_state, remaining_speed
 from sim_core.effects.gravity import STANDARD as G
 from sim_core.scene.invariants import closest_pair, contained, energy
 from tests.helpers.scenes.cavities import FLOOR, WEIGHTLESS, box, cylinder, uniform_restitution
@@ -223,3 +225,28 @@ def test_no_ball_jams_on_its_way_up_with_the_sonotrode() -> None:
 def test_air_that_is_none_is_named(drag: Drag, said: str) -> None:
     with pytest.raises(SceneError, match=rf"drag\.{said} is "):
         Scene(box((0.03,) * 3), gas(box((0.03,) * 3), 1, 1.0, 1), Physics(drag=drag), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("diameter", "density", "speed"),
+    [(1e-3, 500.0, 4.5), (3e-3, 7800.0, 20.0), (2e-3, 1000.0, 0.5)],
+)
+def test_the_speed_that_remains_is_that_of_the_force_of_the_air(
+    diameter: float, density: float, speed: float
+) -> None:
+    """Its deceleration is C_d rho v² A / 2 over the mass, with Reynolds numbers on either side."""
+    air = Drag()
+    state = new_drag_state(air, np.array([9.0, diameter]), np.array([9.0, density]))
+    assert state is not None
+    share = remaining_speed.py_func
+
+    def deceleration(_: float, v: np.ndarray) -> np.ndarray:
+        coefficient = drag_coefficient(float(air.density * v[0] * diameter / air.viscosity))
+        force = coefficient * 0.5 * air.density * v**2 * np.pi / 4.0 * diameter**2
+        return -force / (density * np.pi / 6.0 * diameter**3)
+
+    for span in (1e-3, 0.05):
+        exact = solve_ivp(deceleration, (0.0, span), [speed], rtol=1e-9).y[0, -1]
+        left = share(state, 1, speed, span)
+        assert speed * left == pytest.approx(exact, rel=1e-6)
+        assert share(state, 1, speed * left, -span) == pytest.approx(1.0 / left)
