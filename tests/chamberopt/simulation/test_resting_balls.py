@@ -6,7 +6,13 @@ import trimesh
 
 from chamberopt.chamber.build import Chamber
 from chamberopt.chamber.part import Part
-from chamberopt.simulation.resting_balls import RestingBalls, find_resting_balls, resting_notes
+from chamberopt.geometry.triangles import closest_on_each, unit_normals
+from chamberopt.simulation.resting_balls import (
+    RestingBalls,
+    find_resting_balls,
+    resting_notes,
+    triangles_near,
+)
 from sim_core import Resting
 from tests.helpers.scenes.cavities import box_around
 
@@ -129,3 +135,20 @@ def test_one_note_on_all_replicas() -> None:
         "balls came to rest in 3 of 8 replicas and no longer peen: at the end 7.5 % of the shot, "
         "on average over all replicas; in the worst one, many",
     )
+
+
+@pytest.mark.parametrize("apart", [1e-3, 2e-3])
+def test_triangles_are_near_within_the_reach(chamber: Chamber, apart: float) -> None:
+    """From outside of a box of all of them, opposite the middle of each."""
+    corners = chamber.vertices[chamber.triangles]
+    every = np.arange(len(corners))
+    normals = unit_normals(corners)
+    for k in every:
+        place = corners[k].mean(axis=0) + apart * normals[k]
+        closest = closest_on_each(corners, np.tile(place, (len(every), 1)))
+        away = np.linalg.norm(closest - place, axis=1)
+        for reach in (0.9 * apart, 1.1 * apart):
+            near = triangles_near(chamber, every, place, reach)
+            np.testing.assert_array_equal(near, np.flatnonzero(away <= reach))
+        assert k in near
+        assert k not in triangles_near(chamber, every[every != k], place, 1.1 * apart)
