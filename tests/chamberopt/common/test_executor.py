@@ -17,6 +17,7 @@ from chamberopt.cli import main
 from chamberopt.common.errors import InputError, WorkerLostError
 from chamberopt.common.executor import (
     SerialExecutor,
+    core_count,
     local_executor,
     open_executor,
     result_of,
@@ -232,3 +233,17 @@ def test_ctrl_c_ends_a_wait_also_where_another_thread_is_given_it() -> None:
             ended.set()
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def test_there_is_a_worker_for_each_core_that_may_be_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {1, 5, 6}, raising=False)
+    assert core_count() == 3
+    monkeypatch.delattr(os, "sched_getaffinity")
+    for told, count in ((4, 4), (None, 1)):
+        monkeypatch.setattr(os, "cpu_count", lambda told=told: told)
+        assert core_count() == count
+    with local_executor(1) as one:
+        assert one.submit(abs, -2).result() == 2
+    for workers in (0, -1):
+        with pytest.raises(InputError, match=f"--workers: given {workers}; give at least 1"):
+            local_executor(workers)

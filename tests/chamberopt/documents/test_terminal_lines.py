@@ -1,11 +1,17 @@
 """The end of a command: its main figures in words, and the notes that matter most."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from chamberopt.common.estimate import Estimate
 from chamberopt.documents.coverage import Figure, main_figures
-from chamberopt.documents.terminal_lines import note_lines
+from chamberopt.documents.document import Table
+from chamberopt.documents.terminal_lines import note_lines, sweep_end
 from chamberopt.documents.wording import metric_label, objective_label
+from chamberopt.search.trial_log import Trial
+from tests.helpers.results.resumable_study import study
 
 
 @pytest.mark.parametrize(
@@ -37,3 +43,27 @@ def test_the_almen_intensity_takes_the_place_of_the_strength() -> None:
         "mean_coverage",
         "almen_intensity",
     ]
+
+
+def test_a_sweep_ends_with_its_best_candidate_by_number() -> None:
+    given, figure = study(), Estimate(0.7, 0.1)
+    metrics = {"mean_coverage": Estimate(0.8, 0.1)}
+    best, failed = (
+        Trial(number, "sweep", (0.0,) * 3, {"shot.mass_g": 5.0}, goals, metrics, 0.0, 0.7, True, "")
+        for number, goals in ((4, (figure,)), (5, ()))
+    )
+    trials = [best, failed]
+    for chosen in (best, None):
+        result: Any = SimpleNamespace(study=given, best=chosen, trials=trials, seconds=12.4)
+        lines = sweep_end(result, ["a note"], verbose=False)
+        texts = [one for one in lines if isinstance(one, str)]
+        assert texts[-1] == "note: a note"
+        assert any(one.startswith("2 candidates in 12 s, ") for one in texts)
+        if chosen is None:
+            assert texts[0] == "None of 2 candidates meets the constraints."
+            continue
+        assert texts[0].startswith("The best of 2 candidates, number 5, has this uniform coverage")
+        (table,) = (one for one in lines if isinstance(one, Table))
+        assert ["5"] in [list(row[1:]) for row in table.rows]
+        longer = sweep_end(result, ["a note"], verbose=True)
+        assert len(longer) == len(lines) + 3  # a blank line and two figures

@@ -12,6 +12,8 @@ from chamberopt.pictures.charts.colours import (
     KINDS,
     WIDTH_MAP,
     hex_colours,
+    line_style,
+    zone_colour,
 )
 
 # What eyes without one kind of cone see of linear RGB: Machado, Oliveira and Fernandes 2009,
@@ -66,3 +68,18 @@ def test_any_two_kinds_can_be_told_apart(eye: str) -> None:
 def test_too_few_dents_are_not_taken_for_a_value(scale: str, eye: str) -> None:
     few = lab(FEW_DENTS, eye)
     assert all(np.linalg.norm(few - lab(one, eye)) > LEAST for one in hex_colours(scale, 50))
+
+
+def test_the_first_eight_results_and_five_zones_look_different() -> None:
+    styles = [line_style(k) for k in range(8)]
+    assert (
+        len({str(one["color"]) for one in styles}) == len({str(one["ls"]) for one in styles}) == 8
+    )
+    assert line_style(8) == styles[0]
+    assert len({zone_colour(k) for k in range(5)}) == 5
+    assert zone_colour(7) == zone_colour(2)
+
+
+def test_colours_of_a_map_go_from_end_to_end() -> None:
+    assert hex_colours("gray", 3) == ["#000000", "#808080", "#ffffff"]
+    assert len(hex_colours("gray")) == 10
