@@ -1,11 +1,14 @@
 """The picture of coverage shows part, sonotrode and colours, of one result or several."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+import pytest
 from matplotlib.image import imread
 
-from chamberopt.pictures.coverage import draw_coverage
+from chamberopt.pictures.coverage import coverage_bar, draw_coverage
 from chamberopt.pictures.panels import seen_marks
 from chamberopt.results.vtp_files import pyvista
 from tests.helpers.opengl import needs_opengl
@@ -51,3 +54,27 @@ def test_numbers_stand_where_their_places_are_seen() -> None:
         }.items()
     }  # fmt: skip
     assert seen == {"above": ["1"], "side": ["2"], "steep": ["1"], "below": []}
+
+
+@pytest.mark.parametrize(
+    ("shown", "limits", "beyond", "is_told"),
+    [
+        ([0.0, 50.0, 100.0], (0.0, 100.0), "neither", False),
+        ([50.0, 100.0], (50.0, 100.0), "neither", True),
+        ([49.0, 100.0, np.nan], (50.0, 100.0), "min", True),
+        ([0.0, 91.0], (0.0, 90.0), "max", True),
+        ([49.0, 91.0], (50.0, 90.0), "both", True),
+    ],
+)
+def test_a_bar_of_colours_tells_what_lies_beyond_its_ends(
+    shown: list[float], limits: tuple[float, float], beyond: str, is_told: bool
+) -> None:
+    for unit in ("%", "MPa"):
+        quantity = SimpleNamespace(title="what", unit=unit, colours="viridis")
+        parts: Any = [
+            SimpleNamespace(target={"shown": np.array([one])}, quantity=quantity) for one in shown
+        ]
+        bar = coverage_bar(parts, limits)
+        assert (bar.limits, bar.beyond) == (limits, beyond)
+        scale = f", scale from {limits[0]:g} to {limits[1]:g} %"
+        assert bar.label == "what" + (scale if is_told and unit == "%" else "")
