@@ -5,9 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from shapely import Polygon
 
 from chamberopt.chamber.checks.flat_faces import largest_flat_face
+from chamberopt.chamber.part import Part
 from tests.helpers.synthetic import chamber_round
+
+
+def part_of(body: trimesh.Trimesh) -> Part:
+    return chamber_round(body).part
 
 
 @pytest.mark.parametrize("turn", [0, 1, 2])
@@ -31,3 +37,29 @@ def test_of_faces_alike_the_lowest_is_taken_and_a_ball_has_none() -> None:
     ball = trimesh.creation.icosphere(3, 10e-3)
     round_one = replace(part, vertices=ball.vertices, triangles=ball.faces.astype(np.int32))
     assert largest_flat_face(round_one) is None
+
+
+@pytest.mark.parametrize(("sides", "is_found"), [(31, True), (35, False)])
+def test_a_face_of_less_than_three_per_cent_of_the_surface_is_none(
+    sides: int, is_found: bool
+) -> None:
+    """A tall prism, of whose surface each side is nearly its share."""
+    prism = trimesh.creation.cylinder(1e-3, 0.2, sections=sides)
+    found = largest_flat_face(part_of(prism))
+    assert (found is not None) == is_found
+    if found is not None:
+        assert found.area == pytest.approx(2e-3 * np.sin(np.pi / sides) * 0.2)
+        assert not found.is_alone
+
+
+@pytest.mark.parametrize(("longer", "is_alone"), [(1.0, False), (1.009, False), (1.011, True)])
+def test_a_face_is_alone_where_the_next_is_a_hundredth_smaller(
+    longer: float, is_alone: bool
+) -> None:
+    """A tall bar over a thin trapeze, of which one long side is longer."""
+    outline = Polygon([(0, 0), (5e-3, 0), (5e-3, longer * 20e-3), (0, 20e-3)])
+    bar = trimesh.creation.extrude_polygon(outline, 0.3)
+    found = largest_flat_face(part_of(bar))
+    assert found is not None
+    assert found.is_alone == is_alone
+    assert found.area == pytest.approx(longer * 20e-3 * 0.3, rel=0.012)

@@ -3,12 +3,14 @@
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import trimesh
 
 from chamberopt.chamber.layout.balls import SizeFit, mostly_serving, serving_sizes
+from chamberopt.chamber.propose import proposed_intensity
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_budget import Asked, Measured, propose_budget
@@ -29,6 +31,7 @@ from chamberopt.chamber.propose.proposed_intensity import (
 )
 from chamberopt.chamber.propose.proposed_setting import (
     AMPLITUDE_POWER,
+    BALL_POWER,
     Setting,
     Settings,
     choose,
@@ -501,3 +504,19 @@ def test_balls_that_serve_less_are_taken_only_into_the_range(low: float, taken: 
     wanted = WantedIntensity(low, 1.2 * low, "")
     found = choose(wanted, [fine, coarse], {fine: 0.2}, {1.2: 0.99, 1.5: 0.93})
     assert found.ball_mm == taken
+
+
+def test_what_an_intensity_needs_undoes_what_it_is_off_by_the_law(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(
+        proposed_intensity, "setting_of", lambda _: SimpleNamespace(amplitude_um=40.0, ball_mm=3.0)
+    )
+    made: Any = None
+    for times, larger in ((2.0, "80 µm"), (0.5, "20 µm")):
+        told = proposed_intensity._needed(made, -AMPLITUDE_POWER * math.log(times))
+        assert f"amplitude of about {larger} zero-to-peak" in told
+        assert ("larger than the target's fillets" in told) == (times > 1.0)
+    for times, larger in ((2.0, "6 mm"), (0.5, "1.5 mm")):
+        told = proposed_intensity._needed(made, -BALL_POWER * math.log(times))
+        assert f"balls of about {larger}" in told

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from chamberopt.search.optimiser.acquisition import (
+    DOUBT,
     _choices,
     _knowledge_gradient,
     possible_gain,
@@ -190,3 +191,15 @@ def test_choices_are_round_the_leaders_and_anywhere() -> None:
     anywhere = choices[-spread:]
     assert np.abs(anywhere.mean(axis=0) - 0.5).max() < 0.01
     assert anywhere.std() == pytest.approx(np.sqrt(1.0 / 12.0), rel=0.02)
+
+
+def test_the_gain_is_at_least_what_the_evaluated_points_leave_open() -> None:
+    """Their scores have an error of 0.1: the best may be that of another one."""
+    points = np.random.default_rng(4).random((20, 2))
+    domain, every = Domain([Axis()] * 2), np.ones(20, dtype=bool)
+    scores = np.random.default_rng(5).normal(0.0, 0.1, 20)
+    model = SearchModel(domain, points, Observations(scores, np.full(20, 0.01), every))
+    mean, deviation = model.expected(points)
+    open_gain = (mean + DOUBT * deviation).max() - (mean - DOUBT * deviation).max()
+    assert open_gain > 0.01
+    assert possible_gain(model, 1) >= open_gain
