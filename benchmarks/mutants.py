@@ -12,7 +12,7 @@ program, without the fault and with it; a fault that they pass is missed, with `
 tests of their folder pass it too. Faults that change nothing count as missed, so the share is a
 lower bound. Lines for people (messages, descriptions), and what says how lines and legends of a
 drawing look, get no faults. A fault in the simulator's compiled code takes minutes, as all is
-compiled anew.
+compiled anew. Faults in constants of a file and in its code are counted apart.
 """
 
 from __future__ import annotations
@@ -42,6 +42,9 @@ LOOKS = {
     "lw", "ls", "line_width", "ms", "mew", "point_size", "capsize", "linespacing", "handlelength",
     "bbox_to_anchor", "label_font_size", "arrowprops",
 }  # fmt: skip
+# Of faults: in a number that a file chooses, which a test would tell from a half more by repeating
+# it, or in what the file does.
+CHOICE, CODE = "choice", "code"
 MANY = 10  # the successor of a whole number from here on is hardly another one
 ROUNDING = 1e-6  # numbers below it guard against rounding: a half more would change nothing
 # Of the tests of a file, and of a folder; a fault that makes them longer is caught.
@@ -61,20 +64,31 @@ def mirrored(packages: tuple[str, ...]) -> list[tuple[Path, Path]]:
 
 
 class Faults(ast.NodeTransformer):
-    """Puts the fault with a number into a tree; `count` is how many faults there can be."""
+    """Puts the fault with a number into a tree; `count` is how many faults there can be.
+
+    Its `kind` is CHOICE in the value of a constant of the file, such as MAX_PASSES, else CODE.
+    """
 
     def __init__(self, chosen: int = -1) -> None:
         self.count, self._chosen, self.text = 0, chosen, ""
+        self.kind, self._now = CODE, CODE
 
     def _is_chosen(self, node: ast.AST, text: str) -> bool:
         self.count += 1
         if self.count - 1 != self._chosen:
             return False
-        self.text = f"line {getattr(node, 'lineno', '?')}: {text}"
+        self.text, self.kind = f"line {getattr(node, 'lineno', '?')}: {text}", self._now
         return True
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.AST:
         return node  # words
+
+    def visit_Assign(self, node: ast.Assign) -> ast.AST:
+        names = [one.id for one in ast.walk(node.targets[0]) if isinstance(one, ast.Name)]
+        self._now = CHOICE if node.col_offset == 0 and all(map(str.isupper, names)) else CODE
+        self.generic_visit(node)
+        self._now = CODE
+        return node
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:
         if node.value is not None:
@@ -128,19 +142,19 @@ class Faults(ast.NodeTransformer):
         return node
 
 
-def with_fault(source: str, rng: random.Random) -> tuple[str, str]:
-    """The source with one fault, and what it is; two empty texts if there is nothing to change."""
+def with_fault(source: str, rng: random.Random) -> tuple[str, Faults]:
+    """The source with one fault, and the fault; an empty text if there is nothing to change."""
     counted = Faults()
     counted.visit(ast.parse(source))
     if not counted.count:
-        return "", ""
+        return "", counted
     fault = Faults(rng.randrange(counted.count))
     tree = ast.fix_missing_locations(fault.visit(ast.parse(source)))
-    return ast.unparse(tree), fault.text
+    return ast.unparse(tree), fault
 
 
-def drawn(seeds: range, packages: tuple[str, ...]) -> Iterator[tuple[int, Path, Path, str, str]]:
-    """For each seed a file, its tests, the file's text with a fault, and what the fault is."""
+def drawn(seeds: range, packages: tuple[str, ...]) -> Iterator[tuple[int, Path, Path, str, Faults]]:
+    """For each seed a file, its tests, the file's text with a fault, and the fault."""
     pairs = mirrored(packages)
     for seed in seeds:
         rng, text = random.Random(seed), ""
@@ -198,10 +212,14 @@ def main() -> None:
                 caught = is_caught(copy, own, tests, text)
                 if caught:
                     break
-            rows.append({"seed": seed, "file": own.as_posix(), "fault": fault, "caught": caught})
-            print(*rows[-1].values(), sep="  ", flush=True)
+            rows.append((fault.kind, caught))
+            print(seed, own.as_posix(), fault.kind, fault.text, caught, sep="  ", flush=True)
     if not options.show:
-        print_table([{"faults": len(rows), "caught": sum(row["caught"] for row in rows)}])
+        print_table([
+            {"in": kind, "faults": len(own), "caught": sum(own)}
+            for kind in (CODE, CHOICE)
+            for own in [[bool(caught) for its, caught in rows if its == kind]]
+        ])  # fmt: skip
 
 
 if __name__ == "__main__":
