@@ -14,6 +14,8 @@ from chamberopt.design.load import Design, load_design
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.solids import make_solid
 from chamberopt.geometry.triangles import area_vectors, areas, heights
+from tests.chamberopt.chamber.test_fixture import BOX, END, THROUGH
+from tests.chamberopt.chamber.test_fixture import design as boxed
 
 DESIGNS = Path(__file__).resolve().parents[3] / "designs"
 NAMES = ("gear", "plate", "blade")
@@ -420,3 +422,24 @@ def test_a_mesh_file_that_changes_is_read_again(tmp_path: Path) -> None:
 
     assert len(first.part.triangles) == 12
     assert second.part.smoothing.given_triangles == 320
+
+
+@pytest.mark.parametrize("high", [None, 1.0])  # mm: of the keyway; None: all through
+def test_a_keyway_is_closed_by_the_flanges_of_the_arbor(tmp_path: Path, high: float | None) -> None:
+    drill = trimesh.creation.cylinder(2.0, 20.0, sections=64)
+    key = trimesh.creation.box((1.0, 3.0, 20.0))
+    key.apply_translation((0.0, 1.5, 0.0))
+    holes = [drill, key]
+    for one in holes:
+        one.apply_translation((-5.0, 0.0, 0.0))
+    if high is not None:  # a blind one, and the arbor alone closes it
+        holes[1] = trimesh.creation.box((1.0, 3.0, high))
+        holes[1].apply_translation((-5.0, 1.5, 0.0))
+    body = trimesh.boolean.difference([trimesh.creation.box(BOX), *holes], engine="manifold")
+    body.export(tmp_path / "keyed.stl")
+    flanges = {} if high else {"diameter_mm": 8.0, "thickness_mm": 2.0}
+    holder = {"kind": "arbor", "at": THROUGH, "axis": (0, 1, 0), "both_sides": True, **flanges}
+    given = boxed(tmp_path, "keyed", part={"rotate_deg": (90, 0, 0), "target": END}, holder=holder)
+    notes = build_chamber(given).notes
+    name = "the arbor" if high else "the flanges of the arbor"
+    assert any(note.startswith(f"closed by {name}: a hollow of the part of ") for note in notes)

@@ -419,27 +419,6 @@ def test_an_arbor_without_flanges_covers_nothing_beside_its_hole(parts: Path) ->
     assert chamber.fixtures["holder"].covered_target == 0.0
 
 
-@pytest.mark.parametrize("high", [None, 1.0])  # mm: of the keyway; None: all through
-def test_a_keyway_is_closed_by_the_flanges_of_the_arbor(parts: Path, high: float | None) -> None:
-    drill = trimesh.creation.cylinder(2.0, 20.0, sections=64)
-    key = trimesh.creation.box((1.0, 3.0, 20.0))
-    key.apply_translation((0.0, 1.5, 0.0))
-    holes = [drill, key]
-    for one in holes:
-        one.apply_translation((-5.0, 0.0, 0.0))
-    if high is not None:  # a blind one, and the arbor alone closes it
-        holes[1] = trimesh.creation.box((1.0, 3.0, high))
-        holes[1].apply_translation((-5.0, 1.5, 0.0))
-    body = trimesh.boolean.difference([trimesh.creation.box(BOX), *holes], engine="manifold")
-    body.export(parts / "keyed.stl")
-    flanges = {} if high else {"diameter_mm": 8.0, "thickness_mm": 2.0}
-    holder = {"kind": "arbor", "at": THROUGH, "axis": (0, 1, 0), "both_sides": True, **flanges}
-    given = design(parts, "keyed", part={"rotate_deg": (90, 0, 0), "target": END}, holder=holder)
-    notes = build_chamber(given).notes
-    name = "the arbor" if high else "the flanges of the arbor"
-    assert any(note.startswith(f"closed by {name}: a hollow of the part of ") for note in notes)
-
-
 def test_an_arbor_turns_with_the_part_about_its_own_axis(parts: Path) -> None:
     holder = {"kind": "arbor", "at": THROUGH, "axis": (0, 1, 0), "both_sides": True}
     for through, why in ((-5.0, None), (0.0, r"holder: its axis is 5 mm beside that of effects")):
