@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from chamberopt.geometry.meshes.elements import CORNERS, EDGES, FACES, SHELLS
 from chamberopt.geometry.meshes.part_mesh import read_part
 from tests.helpers.mesh_files import gmsh_2, large, nodes_text, small, volume, written
 
@@ -80,3 +81,19 @@ def test_higher_order_and_solid_elements_become_the_triangles_of_their_surface(
     expected = trimesh.creation.icosphere(subdivisions=order, radius=10.0)
     assert len(part.triangles) == len(expected.faces)
     assert volume(part) == pytest.approx(expected.volume * 1e-9, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", FACES)
+def test_the_faces_of_an_element_close_it_and_share_its_edges(kind: str) -> None:
+    sides = [
+        (a, b) for face in FACES[kind] for a, b in zip(face, (*face[1:], face[0]), strict=True)
+    ]
+    assert len(set(sides)) == len(sides)
+    assert {frozenset(one) for one in EDGES[kind]} == {frozenset(one) for one in sides}
+    assert len(EDGES[kind]) == len(set(map(frozenset, EDGES[kind])))
+    assert {corner for one in sides for corner in one} == set(range(CORNERS[kind]))
+    if kind in SHELLS:
+        assert list(EDGES[kind]) == sides  # in turn, as its mid-edge nodes are
+    else:
+        assert {(b, a) for a, b in sides} == set(sides)
+        assert CORNERS[kind] - len(EDGES[kind]) + len(FACES[kind]) == 2  # Euler
