@@ -124,8 +124,8 @@ def test_a_study_says_what_varies(hostile: Path, pictures: list[str]) -> None:
         constraints={"mean_coverage": {"min": 0.9}},
     )
     found = shown(study)
-    assert re.search(r"shot\.mass_g\s+3 to 6\.5\s+4", found.words)
-    assert "mean_coverage ≥ 0.9" in found.words
+    assert re.search(r"Shot mass \[g\]\s+3 to 6\.5\s+4", found.words)
+    assert "mean coverage of the target ≥ 90 %" in found.words
     assert len(found.sources) == 1
 
 

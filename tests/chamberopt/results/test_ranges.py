@@ -225,7 +225,7 @@ def test_a_study_says_whether_its_best_stays_best(
     (table,) = [one for one in said if isinstance(one, Table)]
     assert table.head == ("", "start", "best", "range")
     rows = {name: values for name, *values in table.rows}
-    assert rows["shot.mass_g"][-1] == ""
+    assert rows["Shot mass [g]"][-1] == ""
     of_best = range_texts(read.record.ranges)["time_to_98_s"]
     assert rows[metric_label("time_to_98_s").with_unit][-1] == of_best
 
