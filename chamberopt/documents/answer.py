@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from chamberopt.chamber.checks.calibration import misfit_texts
+from chamberopt.common.errors import one_line
 from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.number_text import percent
 from chamberopt.documents.coverage import change, is_bound
@@ -154,11 +155,12 @@ def shot_lines(result: Result) -> Iterator[AnswerLine]:
     """Yield warnings of balls that jam, and of a shot that had not settled."""
     trapped = result.record.trapped
     if trapped and max(trapped.rattling_time, trapped.rattling_impacts) >= JAMMED:
+        place = f", e.g. {one_line(trapped.place)} in the chamber's frame" if trapped.place else ""
         text = (
             "Balls are held or rattle in gaps hardly wider than they are: "
             f"{percent(trapped.rattling_time)} of the shot at any time, and "
-            f"{percent(trapped.rattling_impacts)} of the impacts on the part. The notes have the "
-            "place: choose other balls, or close or widen the gap."
+            f"{percent(trapped.rattling_impacts)} of the impacts on the part"
+            f"{place}. Choose other balls, or close or widen the gap."
         )
         yield AnswerLine("process", text, True)
     if excess := result.record.first_half_excess:

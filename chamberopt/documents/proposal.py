@@ -24,6 +24,7 @@ from chamberopt.chamber.propose.text import TO_SETTLE, clauses, to_settle
 from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import in_words
 from chamberopt.common.number_text import NO_BREAK, held_together, plain, rounded
+from chamberopt.design.intensity import NOT_DECIDED
 from chamberopt.documents.document import Table
 from chamberopt.geometry.triangles import areas
 from chamberopt.peening.strip import StripSize
@@ -249,17 +250,18 @@ def _in_short(target: str) -> str:
 
 def _intensity(made: Proposal) -> str:
     """Return a sentence on the expected intensity beside the usual or wanted one, if known."""
-    if made.expected is None:
+    expected, usual = made.expected, made.usual
+    if expected is None:
         return ""
-    aim = ""
-    if made.usual is not None:
-        off = made.usual.off(made.expected.value)
-        is_inside = made.usual.low <= made.expected.value <= made.usual.high
-        side = "below" if off < 0.0 else "above" if off > 0.0 else "close to"
-        side = "within" if is_inside else side
-        kind = "usual" if made.design.process.intensity_mmA is None else "wanted"
-        aim = f", {side} the {kind} {made.usual.low:g} to {made.usual.high:g} mmA"
-    return f" Almen intensity about {plain(made.expected.value, 2)} mmA{aim}."
+    text = f" Almen intensity about {plain(expected.value, 2)} mmA{expected.factor_in_words}"
+    if usual is None:
+        return f"{text}."
+    kind = "usual" if made.design.process.intensity_mmA is None else "wanted"
+    aim = f"{usual.low:g} to {usual.high:g} mmA"
+    standing = expected.standing((usual.low, usual.high))
+    if standing == NOT_DECIDED:
+        return f"{text}; {kind}: {aim}. Strips decide."
+    return f"{text}, {standing} the {kind} {aim}."
 
 
 def _time(made: Proposal) -> str:

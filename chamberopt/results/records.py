@@ -212,6 +212,7 @@ class TrappedRecord(Table):
         rattling_balls: share of the balls that rattled in a gap at some time; None if not known, as
             in results whose figures still have the impacts of rattling balls.
         rattling_longest: share of the recorded time in which the ball held longest was held.
+        place: surfaces and position of the gap whose balls hit the part most often; "" if none.
     """
 
     hopping_time: Share
@@ -221,6 +222,7 @@ class TrappedRecord(Table):
     rattling_impacts: Share
     rattling_balls: Share | None = None
     rattling_longest: Share | None = None
+    place: str = ""
 
 
 class AdviceRecord(Table):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -222,7 +223,7 @@ def _write_candidate(folder: Path, candidate: CandidateResult, **more: Any) -> C
         simulated_time_s=evaluation.simulated_time,
         collisions=evaluation.collisions,
         timings_s={step: round(seconds, 3) for step, seconds in evaluation.timings.items()},
-        trapped=TrappedRecord(**evaluation.trapped) if evaluation.trapped else None,
+        trapped=TrappedRecord(**asdict(evaluation.trapped)) if evaluation.trapped else None,
         first_half_excess=evaluation.first_half_excess,
         chamber=ChamberRecord(
             volume_mm3=chamber.volume * 1e9,

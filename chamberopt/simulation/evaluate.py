@@ -50,7 +50,7 @@ from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.replicas import ReplicaSet, ReplicaSetting, Underway, run_in_order
 from chamberopt.simulation.resting_balls import resting_notes
 from chamberopt.simulation.settling import first_half_excess, settling_notes
-from chamberopt.simulation.trapped_balls import trapped_notes, trapped_shares
+from chamberopt.simulation.trapped_balls import TrappedBalls, mean_trapped, trapped_notes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -196,21 +196,21 @@ class _Run:
             metrics |= {figure: one for figure, one in of_step.items() if find_metric(figure)}
         return metrics
 
-    def ball_notes(self) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Return shares of trapped balls, and notes on balls that are trapped or at rest.
+    def ball_notes(self) -> tuple[TrappedBalls | None, tuple[str, ...]]:
+        """Return what trapped balls did, and notes on balls that are trapped or at rest.
 
-        With steps, the shares are those of the step in which most balls are held in gaps.
+        With steps, it is what they did in the step in which most balls are held in gaps.
         """
         replicas, found, notes = self.known.replicas, [], []
         for k, (name, design) in enumerate(self.design.in_steps.items()):
             own = [one.steps[k] if one.steps else one for one in replicas]
-            found.append(trapped_shares([one.trapped for one in own]))
+            found.append(mean_trapped([one.trapped for one in own]))
             said = (
                 *trapped_notes([one.trapped for one in own], design),
                 *resting_notes([one.resting for one in own if one.resting], len(own)),
             )
             notes += [f"step {name.replace('_', ' ')}: {note}" if name else note for note in said]
-        return max(found, key=lambda shares: shares.get("rattling_impacts", 0.0)), tuple(notes)
+        return max(found, key=lambda one: one.rattling_impacts if one else 0.0), tuple(notes)
 
     def look_after_more(self, progress: Progress | None) -> Evaluation:
         """Add the replicas of the next step, and return the evaluation of all replicas.

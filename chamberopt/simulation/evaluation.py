@@ -17,7 +17,7 @@ from chamberopt.coverage.coverage_intervals import Resolution
 from chamberopt.coverage.field.symmetry import MAX_COPIES
 from chamberopt.coverage.metrics import METRICS, find_metric
 from chamberopt.coverage.part_impacts import Hits, require_impacts
-from chamberopt.simulation.trapped_balls import SHARES as TRAPPED_SHARES
+from chamberopt.simulation.trapped_balls import SHARES, TrappedBalls
 
 REMEDY = "restore the file or run the study in a new folder"
 
@@ -48,9 +48,7 @@ class Evaluation:
     zones: dict[str, float] = field(default_factory=dict)
     # Share of the target that a ball can touch in each step, by its name; of no steps without.
     steps: dict[str, float] = field(default_factory=dict)
-    # Shares of hopping and of rattling balls, by the names in trapped_balls.py. Empty if they are
-    # not known.
-    trapped: dict[str, float] = field(default_factory=dict)
+    trapped: TrappedBalls | None = None  # what hopping and rattling balls did; None if not known
     # By what share the target was dented more in the first halves of the replicas than in the
     # second, where that is more than noise: the shot had not settled. None if it is not.
     first_half_excess: float | None = None
@@ -67,7 +65,7 @@ def load_evaluation(path: Path) -> Evaluation:
 
     Raises InputError if the file is missing or damaged, or holds values that no evaluation has.
     """
-    found = load_record(path, Evaluation, (Estimate, Hits, Resolution), REMEDY)
+    found = load_record(path, Evaluation, (Estimate, Hits, Resolution, TrappedBalls), REMEDY)
     try:
         _require_sound(found)
     except ValueError as error:
@@ -96,7 +94,7 @@ def _require_sound(found: Evaluation) -> None:
     known = [
         found.objective.value, found.reachable, found.crease_share, found.simulated_time,
         needed.dents, needed.needed_for_mean, needed.needed_for_places, needed.simulated_time,
-        *found.timings.values(), *found.collisions.values(), *found.trapped.values(),
+        *found.timings.values(), *found.collisions.values(),
         found.first_half_excess or 0.0,
         *(one.bias for one in estimates),
         *(x for one in estimates for x in (*one.pseudovalues, *one.shared)),
@@ -107,9 +105,7 @@ def _require_sound(found: Evaluation) -> None:
         raise ValueError("it has no simulated time, or no replicas")
     if not 1 <= found.alike <= MAX_COPIES:
         raise ValueError(f"{found.alike} places alike")
-    if found.trapped and found.trapped.keys() != set(TRAPPED_SHARES):
-        raise ValueError("shares of trapped balls are missing")
-    if not all(0.0 <= share <= 1.0 for share in found.trapped.values()):
+    if found.trapped and not all(0.0 <= getattr(found.trapped, one) <= 1.0 for one in SHARES):
         raise ValueError("a share of trapped balls is not from 0 to 1")
     if any(one.half_width < 0.0 for one in estimates):
         raise ValueError("an interval is negative")

@@ -7,7 +7,7 @@ Definitions of *hopping* and *rattling* balls are in sim_core/loop/stays.py.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
@@ -99,28 +99,29 @@ def _place(result: SimulationResult, chamber: Chamber, part_turns: bool) -> str:
     return f"{join_names('at', names)}, around {around(position[None])}"
 
 
-def trapped_shares(found: Sequence[TrappedBalls]) -> dict[str, float]:
-    """Return the mean of each share over the replicas, by its name; nothing without replicas."""
-    if not found:
-        return {}
-    return {name: float(np.mean([getattr(one, name) for one in found])) for name in SHARES}
+def mean_trapped(found: Sequence[TrappedBalls]) -> TrappedBalls | None:
+    """Return the mean of each share over the replicas, and the place of the replica with most.
 
-
-def jammed_text(shares: Mapping[str, float], design: Design) -> str:
-    """Return how many balls are lost in gaps and for how long, as text; "" if hardly any are.
-
-    Args:
-        shares: mean of each share over the replicas, by its name.
+    It is None without replicas.
     """
-    if max(shares["rattling_time"], shares["rattling_impacts"]) < MIN_SHARE:
+    if not found:
+        return None
+    worst = max(found, key=lambda one: (one.rattling_impacts, one.rattling_time))
+    means = (float(np.mean([getattr(one, name) for one in found])) for name in SHARES)
+    return TrappedBalls(*means, worst.place)
+
+
+def jammed_text(mean: TrappedBalls, design: Design) -> str:
+    """Return how many balls are lost in gaps and for how long, as text; "" if hardly any are."""
+    if max(mean.rattling_time, mean.rattling_impacts) < MIN_SHARE:
         return ""
     seconds = design.process.recorded_time
     return (
-        f"{plain(shares['rattling_balls'] * design.shot.count, 2)} of {design.shot.count} balls "
+        f"{plain(mean.rattling_balls * design.shot.count, 2)} of {design.shot.count} balls "
         "are held or rattle in gaps hardly wider than themselves, the longest one for "
-        f"{plain(shares['rattling_longest'] * seconds, 2)} of {plain(seconds, 2)} s: the shot "
-        f"loses {percent(shares['rattling_time'])} of its time, and "
-        f"{percent(shares['rattling_impacts'])} of all impacts on the part are those of held "
+        f"{plain(mean.rattling_longest * seconds, 2)} of {plain(seconds, 2)} s: the shot "
+        f"loses {percent(mean.rattling_time)} of its time, and "
+        f"{percent(mean.rattling_impacts)} of all impacts on the part are those of held "
         "balls, which count in no figure"
     )
 
@@ -131,11 +132,11 @@ def trapped_notes(found: Sequence[TrappedBalls], design: Design) -> tuple[str, .
     Args:
         found: what they did in each replica.
     """
-    mean = trapped_shares(found)
+    mean = mean_trapped(found)
     notes = []
-    if mean and max(mean["hopping_time"], mean["hopping_impacts"]) >= MIN_SHARE:
+    if mean and max(mean.hopping_time, mean.hopping_impacts) >= MIN_SHARE:
         some = sum(one.hopping_time > 0.0 for one in found)
-        end = mean["hopping_at_end"]
+        end = mean.hopping_at_end
         ends = "" if not end else f", and at the end {_of_the_shot(end)} did"
         remedy = (
             "the shot may be too dense to move sideways: lower shot.mass_g"
@@ -145,14 +146,13 @@ def trapped_notes(found: Sequence[TrappedBalls], design: Design) -> tuple[str, .
         )
         notes.append(
             f"in {some} of {len(found)} replicas balls hopped up and down on one spot: "
-            f"{percent(mean['hopping_time'])} of the shot's time and "
-            f"{percent(mean['hopping_impacts'])} of the impacts on the part{ends}; do not trust "
+            f"{percent(mean.hopping_time)} of the shot's time and "
+            f"{percent(mean.hopping_impacts)} of the impacts on the part{ends}; do not trust "
             f"where the dents are; {remedy}"
         )
     if mean and (jammed := jammed_text(mean, design)):
-        worst = max(found, key=lambda one: (one.rattling_impacts, one.rattling_time))
         notes.append(
-            f"{jammed}; e.g. {worst.place} in the chamber's frame; give another "
+            f"{jammed}; e.g. {mean.place} in the chamber's frame; give another "
             "shot.diameter_mm than the gap, or close it"
         )
     return tuple(notes)

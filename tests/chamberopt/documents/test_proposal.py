@@ -173,21 +173,23 @@ def test_a_mark_may_begin_with_an_article() -> None:
 @pytest.mark.parametrize(
     ("value", "words"),
     [
-        (0.20, "within the usual 0.2 to 0.3"),
-        (0.30, "within the usual 0.2 to 0.3"),
-        (0.10, "below the usual 0.2 to 0.3"),
-        (0.60, "above the usual 0.2 to 0.3"),
+        (0.20, "inside the usual 0.2 to 0.3 mmA."),
+        (0.10, "outside the usual 0.2 to 0.3 mmA."),
+        (0.60, "outside the usual 0.2 to 0.3 mmA."),
     ],
 )
-def test_an_intensity_is_told_by_its_side_of_the_range(
+def test_an_intensity_stands_beside_its_range_and_only_strips_decide(
     made: Proposal, value: float, words: str
 ) -> None:
-    expected = PredictedIntensity.estimated(Estimate(value / 13.5e-3, 0.0))
     usual = WantedIntensity(0.2, 0.3)
-    told = _intensity(replace(made, expected=expected, usual=usual))
-    assert told == f" Almen intensity about {expected.value:.2g} mmA, {words} mmA."
+    rough = PredictedIntensity.estimated(Estimate(value / 13.5e-3, 0.0))
+    known = PredictedIntensity(value, value, value, 1.0)
+    about = f" Almen intensity about {value:.2g} mmA"
+    told = _intensity(replace(made, expected=rough, usual=usual))
+    assert told == f"{about}, within a factor of 2.5; usual: 0.2 to 0.3 mmA. Strips decide."
+    assert _intensity(replace(made, expected=known, usual=usual)) == f"{about}, {words}"
     assert _intensity(replace(made, expected=None, usual=usual)) == ""
-    assert _intensity(replace(made, expected=expected, usual=None)).endswith(" mmA.")
+    assert _intensity(replace(made, expected=rough, usual=None)).endswith(" of 2.5.")
 
 
 def test_several_numbered_faces_are_one_list() -> None:

@@ -64,6 +64,7 @@ from chamberopt.results.load import Result, load_result
 from chamberopt.results.looked_places import MOST_PLACES, looked_places
 from chamberopt.results.records import FixtureRecord, TrappedRecord, ZoneLimit, ZoneRecord
 from chamberopt.results.shot_push import push_of_shot
+from chamberopt.simulation.trapped_balls import SHARES
 from sim_core import restitution_at
 from tests.helpers.drawings import boxes_of, require_apart
 from tests.helpers.results.report_folders import simulated
@@ -574,12 +575,14 @@ def test_a_part_that_lies_on_the_walls_leaves_one_tolerance(folder: Path) -> Non
 
 def test_what_forbids_to_use_it_is_in_red(folder: Path) -> None:
     """Of a result that is put together here: figures, jammed balls and the time."""
-    result, trapped = load_result(folder), dict.fromkeys(TrappedRecord.model_fields, 0.0)
+    result, trapped = load_result(folder), dict.fromkeys(SHARES, 0.0)
     assert not any("rattle" in text for text in alarms(result))
-    jammed = TrappedRecord(**trapped | {"rattling_time": 0.12, "rattling_impacts": 0.48})
+    trapped |= {"rattling_time": 0.12, "rattling_impacts": 0.48}
+    jammed = TrappedRecord(**trapped, place="at the gutter, around (8.0, -6.7, 35.5) mm")
     record = result.record.model_copy(update={"trapped": jammed})
     (told,) = [text for text in alarms(replace(result, record=record)) if "rattle" in text]
     assert "12 % of the shot at any time, and 48 % of the impacts" in told
+    assert "part, e.g. at the gutter, around (8.0, -6.7, 35.5) mm in the chamber's frame." in told
     assert told in [one.text for one in answer_lines(replace(result, record=record)) if one.warns]
     assert not any("settled" in text for text in alarms(result))
     lively = result.record.model_copy(update={"first_half_excess": 0.12})

@@ -1,5 +1,6 @@
 """Notes on balls that hop on one spot or rattle in a gap: the shipped plate, and made-up balls."""
 
+from dataclasses import asdict
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,8 +20,8 @@ from chamberopt.simulation.trapped_balls import (
     SHARES,
     TrappedBalls,
     find_trapped_balls,
+    mean_trapped,
     trapped_notes,
-    trapped_shares,
 )
 from sim_core import Balls, Trapped
 from tests.helpers.scenes.cavities import box_around
@@ -51,7 +52,7 @@ def test_all_balls_of_few_end_hopping_and_the_note_says_so() -> None:
     assert "in 1 of 1 replicas balls hopped up and down on one spot" in note
     assert "at the end all balls did" in note
     assert "effects.roughness" in note
-    assert TrappedRecord(**trapped_shares([found])).hopping_at_end == 1.0
+    assert TrappedRecord(**asdict(mean_trapped([found]))).hopping_at_end == 1.0
 
 
 @pytest.fixture(scope="module")
@@ -114,5 +115,6 @@ def test_a_few_hops_change_no_figure_and_make_no_note() -> None:
     few = TrappedBalls(0.002, 0.004, 0.0, 0.0, 0.001, 0.1, 0.004, "")
     assert trapped_notes([few, NOT_TRAPPED], plate_design()) == ()
     assert trapped_notes([], plate_design()) == ()
-    assert trapped_shares([]) == {}
-    assert tuple(trapped_shares([few])) == SHARES == tuple(TrappedRecord.model_fields)
+    assert mean_trapped([]) is None
+    assert mean_trapped([few]) == few
+    assert (*SHARES, "place") == tuple(TrappedRecord.model_fields)
