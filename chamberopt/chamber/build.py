@@ -358,7 +358,7 @@ def _beside_sonotrode(part: Part, design: Design) -> list[str]:
     lowest, amplitude = float(part.vertices[:, 2].min()), design.sonotrode.largest_amplitude
     if lowest > amplitude:
         return []
-    face = design.sonotrode.face
+    face, near = design.sonotrode.face, ""
     if face is not None:
         over = lowest_over(part.vertices, part.triangles, face.outline)
         if over <= amplitude:
@@ -367,9 +367,11 @@ def _beside_sonotrode(part: Part, design: Design) -> list[str]:
                 f"walls the part reaches down to {1e3 * over:.3g} mm over it, so that it would be "
                 "hit; take a smaller sonotrode, or turn or move the part"
             )
+        if math.isfinite(over):
+            near = f" beside it, and comes down to {1e3 * over:.3g} mm over its rim"
     return [
         f"{part.name}: outside of the walls it reaches {-1e3 * lowest:.3g} mm below the "
-        "sonotrode's face: nothing of the machine may be there"
+        f"sonotrode's face{near}: nothing of the machine may be there"
     ]
 
 

@@ -60,8 +60,8 @@ def answer(result: Result, start: Result | None, tells_aim: bool = True) -> str:
             )
         if is_bound(known := result.metrics["mean_coverage"]):
             return (
-                f"After {plain(treatment_time)} s {_least_covered(result)}, and too few dents were "
-                f"simulated to tell the mean, but that it is {known.in_words} (95 % intervals); "
+                f"After {plain(treatment_time)} s {_least_covered(result)}; the mean is "
+                f"{known.in_words}, and more dents would tell it closer (95 % intervals); "
                 f"{full_coverage(result)}."
             )
         text = (

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from chamberopt.common.estimate import CONFIDENCE, Estimate
 from chamberopt.common.key_words import title_with_unit
 from chamberopt.common.number_text import estimate_text
+from chamberopt.documents.answer import shot_lines
 from chamberopt.documents.coverage import labels_of, main_names
 from chamberopt.documents.document import Table
 from chamberopt.documents.wording import Label, metric_label, plain
@@ -45,6 +46,7 @@ def summary(comparison: Comparison) -> list[Table | str]:
     sentences = [_sentence(comparison, *shown[0], k) for k in range(len(later))] if shown else []
     if not comparison.parameters:
         sentences.append("No number of the designs differs: they were simulated again.")
+    sentences += doubts(comparison)
     several = len(later) > 1
     rows = [
         [title_with_unit(name), *map(_shown, values), *[""] * (not several)]
@@ -60,6 +62,12 @@ def summary(comparison: Comparison) -> list[Table | str]:
     heads = ["", *comparison.labels, *[f"{later[0]} - {first}"] * (not several)]
     legend = f"±: 95 % intervals. *: differs from {first} by more than noise."
     return [*sentences, "", Table("", heads, rows, numbers=False), "", legend]
+
+
+def doubts(comparison: Comparison) -> list[str]:
+    """Return the warnings of balls that jam, or of a shot that had not settled, of each result."""
+    named = zip(comparison.labels, comparison.results, strict=True)
+    return [f"{name}: {line.text}" for name, one in named for line in shot_lines(one)]
 
 
 def _sentence(comparison: Comparison, name: str, label: Label, k: int) -> str:
@@ -86,9 +94,10 @@ def _which_is_better(
     """
     (first, later), (before, after) = names, values
     if not (before.has_number and after.has_number) or gap.in_words:
+        lacking = [name for name, one in zip(names, values, strict=True) if not one.has_number]
         return (
             f"No difference is resolved between {later} and {first}: too few dents were simulated "
-            f"to tell the {label.text} of both."
+            f"to tell the {label.text} of {lacking[0] if len(lacking) == 1 else 'both'}."
         )
     if gap.value == 0.0 and gap.half_width == 0.0:
         return f"{later} is like {first}: the {label.text} of both is {label.format(after)}."

@@ -98,7 +98,7 @@ def _main_facts(design: Design, facts: Mapping[str, Any]) -> Iterator[Fact]:
     yield Fact("shot", f"{100.0 * shot['packing_fraction']:.2g} % of the chamber")
     if "sonotrode_clearance_mm" in chamber:
         gap = _quantity(chamber, "sonotrode_clearance_mm")
-        yield Fact("clearance", f"{gap} between sonotrode and part")
+        yield Fact("clearance", f"{gap} between sonotrode and part in the chamber")
     if "reach" in facts:
         reach = facts["reach"]
         share = f"{100.0 * reach['target_reachable_share']:.3g} % of the target"

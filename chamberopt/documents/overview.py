@@ -11,7 +11,7 @@ import numpy as np
 from chamberopt.chamber.checks.check import notes
 from chamberopt.common.key_words import title_with_unit
 from chamberopt.documents.answer import answer, answer_lines
-from chamberopt.documents.comparison import summary
+from chamberopt.documents.comparison import doubts, summary
 from chamberopt.documents.coverage import figures, figures_table
 from chamberopt.documents.document import Block, Fold, Items, Section, Sentence, Table, values
 from chamberopt.documents.report import limits_of_intervals, notes_of
@@ -104,8 +104,10 @@ def sweep_overview(sweep: SweepResult) -> Section:
 def comparison_overview(comparison: Comparison) -> Section:
     """Return the overview of a comparison: a sentence for each candidate, and the main figures."""
     title, lines = f"Comparison with {comparison.labels[0]}", summary(comparison)
-    end = lines.index("")
-    answers = [Sentence(str(one), "sentence") for one in lines[:end]]
+    end, warned = lines.index(""), doubts(comparison)
+    answers = [
+        Sentence(str(one), "warning" if one in warned else "sentence") for one in lines[:end]
+    ]
     return Section(title, [*answers, *_blocks(lines[end:])], is_answer=True)
 
 

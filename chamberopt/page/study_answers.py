@@ -50,7 +50,8 @@ def candidates_answer(folder: Path) -> dict[str, object]:
     """Return all candidates of a study so far, with what its plots show of them.
 
     Numbers are in the units of their labels. A candidate that was not simulated has no objective.
-    One that is confirmed is named by its number in the search, which is `of`.
+    One that is confirmed is named by its number in the search, which is `of`. One that was not
+    searched is what the search's model recommends.
 
     Raises:
         InputError: the folder is no study's, or a file of it is damaged.
@@ -70,7 +71,7 @@ def candidates_answer(folder: Path) -> dict[str, object]:
         {
             "number": one.number,
             "of": (of := first.get(trial.point, one.number)),
-            "name": str(of) if of == one.number else f"{of} again",
+            "name": _name(trial, one.number, of),
             "kind": _kind(trial),
             "is_start": _is_start(trial),
             "is_best": trial is best_trial,
@@ -106,6 +107,12 @@ def candidates_answer(folder: Path) -> dict[str, object]:
         "front": _front(trials) if len(labels) > 1 else [],
         "colours": COLOURS,
     }
+
+
+def _name(trial: Trial, number: int, of: int) -> str:
+    if of != number:
+        return f"{of} again"
+    return f"{of}, by the model" if trial.stage == "confirm" else str(of)
 
 
 def _best(trials: Sequence[Trial]) -> Trial | None:

@@ -129,7 +129,7 @@ def part_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         yield "offset from the axis", f"x {plain(x)} mm, y {plain(y)} mm" if x or y else "none"
         text = f"{plain(result.design.chamber.sonotrode_distance_mm)} mm"
         yield (
-            "sonotrode to lowest point",
+            f"sonotrode to lowest point{' between the walls' * bool(built.openings)}",
             with_limits(result, "chamber.sonotrode_distance_mm", text),
         )
     if turn is not None:

@@ -45,6 +45,11 @@ find("of").addEventListener("change", () => {
   allow();
   tellDuration();
 });
+find("of-the-design").addEventListener("click", () => {
+  find("of").value = state.file.files.find(({ kind }) => kind === "design").name;
+  find("of").dispatchEvent(new Event("change"));
+  document.querySelector("[data-command=simulate]").click();
+});
 
 // Begin the search of one's own with the question of a file, if it is a study.
 function takeQuestion(file) {

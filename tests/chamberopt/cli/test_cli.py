@@ -517,7 +517,7 @@ class TestWhole:
         alone = json.loads(out)["metrics"]["mean_coverage"]["value"]
         assert alone == compared["metrics"]["mean_coverage"][1]["value"]
         status, out, err = chamberopt("compare", "results/compare/plate", "results/compare/heavier")
-        assert (status, "shot.mass_g" in out, "instead of" in err) == (0, True, False)
+        assert (status, "Shot mass [g]" in out, "instead of" in err) == (0, True, False)
         assert out.splitlines()[-1] == f"results in {Path('results/compare-2')}"
 
     def test_compare_refuses_before_it_makes_a_folder(self, small: Path, chamberopt: Said) -> None:

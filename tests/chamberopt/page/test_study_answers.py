@@ -5,7 +5,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,9 +14,15 @@ from chamberopt.common.errors import InputError
 from chamberopt.design.load import load_design
 from chamberopt.page import further_study
 from chamberopt.page.acts import Acts, list_results
-from chamberopt.page.study_answers import _front, candidate_answer, candidates_answer, model_answer
+from chamberopt.page.study_answers import (
+    _front,
+    _name,
+    candidate_answer,
+    candidates_answer,
+    model_answer,
+)
 from chamberopt.search.study import load_study
-from chamberopt.search.trial_log import read_trials
+from chamberopt.search.trial_log import Trial, read_trials
 from tests.helpers.results.followed_study import BUDGET, Hill, followed_study
 from tests.helpers.studies import run_in_folder
 
@@ -67,6 +73,13 @@ def test_every_candidate_is_there_as_the_log_has_it(out: Path) -> None:
         assert (one["objective"] is None) == (not trial.goals)
     scores = [one.goals[0].value for one in trials if one.goals and one.stage == "search"]
     assert [best for _, best in answer["best"]] == np.maximum.accumulate(scores).tolist()
+
+
+def test_a_confirmation_is_named_by_the_candidate_that_it_confirms() -> None:
+    search, confirm = (cast(Trial, SimpleNamespace(stage=one)) for one in ("search", "confirm"))
+    assert _name(search, 3, 3) == "3"
+    assert _name(confirm, 6, 3) == "3 again"
+    assert _name(confirm, 7, 7) == "7, by the model"
 
 
 def test_the_front_names_candidates_as_the_page_does_from_the_least_of_the_first_objective() -> (

@@ -42,7 +42,11 @@ for (const tab of document.querySelectorAll("nav button")) tab.addEventListener(
   if (tab.dataset.tab === "run" && running()) { if (folder !== running()) followStudy(running()); }
   else if (folder) closeStudy();
 });
-find("study-result").addEventListener("click", () => document.dispatchEvent(new CustomEvent("result", { detail: folder })));
+find("study-result").addEventListener("click", () => attempt(async () => {
+  const best = data.candidates.find((one) => one.is_best);
+  if (best) await choose(best.number); // so that its numbers stand beside its result
+  document.dispatchEvent(new CustomEvent("result", { detail: folder }));
+}));
 
 // Look at the study, draw what is new, and look again until it has ended.
 async function look() {
