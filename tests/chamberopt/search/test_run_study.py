@@ -128,14 +128,14 @@ def test_constraints_hold_for_the_answer(tmp_path: Path) -> None:
     x = shares(result.best.design)
     assert x[2] <= 0.4
     assert hill(x) > hill(np.array([*OPTIMUM[:2], 0.4])) - 0.04
-    assert any("mean_coverage" in trial.reason for trial in result.trials)
+    assert any("mean coverage of the target" in trial.reason for trial in result.trials)
 
 
 def test_constraints_nobody_meets_are_the_users_to_loosen(tmp_path: Path) -> None:
     question = study(evaluations=6).model_copy(
         update={"constraints": {"mean_coverage": Limits(min=3.0)}}
     )
-    with pytest.raises(InputError, match=r"mean_coverage .* < min 3.*history\.jsonl"):
+    with pytest.raises(InputError, match=r"mean coverage of the target .* < min 3.*history\.jsonl"):
         run(question, tmp_path, analytic(0.0))
     assert len(read_trials(tmp_path)) == 7  # the search and the start's confirmation
 

@@ -103,6 +103,7 @@ const soft = (text) => element("p", { className: "soft", textContent: text });
 const figure = (caption, ...inner) => element("figure", {}, element("figcaption", { textContent: caption }), ...inner);
 
 function draw() {
+  if (!data.candidates.length) return find("study-of").replaceChildren(soft("No chamber is simulated yet: the plots begin with the first."));
   const shares = new Map((model?.shares ?? []).map(([name, share, text]) => [name, { share, text }]));
   const axes = data.axes.toSorted((a, b) => (shares.get(b.name)?.share ?? 0) - (shares.get(a.name)?.share ?? 0));
   const before = find("study-of").querySelector(".rows")?.scrollTop ?? 0;
