@@ -52,7 +52,7 @@ def test_a_violated_limit_costs_its_share_of_the_unit_and_is_told() -> None:
     assert trial.penalty == pytest.approx(0.2)
     assert trial.score == pytest.approx(0.7 - 4.0 * 0.2)
     assert not trial.feasible
-    assert trial.reason == "mean_coverage 0.4 < min 0.5"
+    assert trial.reason == "mean coverage of the target 0.4 < min 0.5"
     assert trial.metrics["uniform_coverage"].pseudovalues == ()
     assert trial.goals[0].pseudovalues == (0.6, 0.8)
     judge, candidate, figures = judged(limited, mean_coverage=Estimate(0.6, 0.0))
