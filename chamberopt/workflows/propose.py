@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.propose.first_design import propose, propose_alike
+from chamberopt.chamber.propose.harmless_ranges import with_harmless_ranges
 from chamberopt.chamber.propose.proposal import new_harm
 from chamberopt.chamber.propose.proposed_budget import TooSlowError, measured_budget, with_budget
 from chamberopt.chamber.propose.proposed_intensity import (
@@ -203,6 +204,7 @@ def _written(first: Proposal, pilots: _Pilots, folder: Path) -> Proposed:
     teller.tell(draw_target(first.design, first.chamber, folder / PICTURE))
     made = pilots.improve(first) if pilots.wishes.pilot else first
     pilots.begin(WRITING)
+    made = with_harmless_ranges(made)
     if made.chamber is not first.chamber:
         remove_file(folder / PICTURE)  # of the first proposal
         told = draw_target(made.design, made.chamber, folder / PICTURE)
