@@ -237,9 +237,9 @@ def test_the_real_thing_end_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     # Twice the amplitude hits harder and more often: even a study of seconds must see that.
     monkeypatch.setattr("chamberopt.workflows.save_run.draw_coverage", lambda *_: None)
     design = plate_design(
-        sonotrode__amplitude_um=15, process__accuracy__simulated_time_s=0.1,
+        sonotrode__amplitude_um=15, process__accuracy__simulated_time_s=0.3,
         process__accuracy__warmup_time_s=0.05, process__accuracy__replicas=3,
-        process__treatment_time_s=20,
+        process__treatment_time_s=5,
     )  # fmt: skip
     question = Study(
         design=design,
