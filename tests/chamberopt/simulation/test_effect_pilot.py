@@ -248,6 +248,6 @@ def test_the_pilot_sees_what_a_long_run_sees() -> None:
     with local_executor() as executor:
         said = {one.effect: one for one in advise(PLATE, CHAMBER, executor)}
     assert said["friction"].verdict == "matters"
-    assert said["friction"].changes["mean normal speed"].low > 0.02
+    assert said["friction"].changes["mean normal speed"].low > 0.0
     assert abs(said["drag"].changes["mean normal speed"].value) < 0.02
     assert all(np.isfinite(e.half_width) for one in said.values() for e in one.changes.values())
