@@ -35,6 +35,7 @@ SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways 
 QUICKER, AS_STRONG, HALF = 0.8, 0.8, 0.5
 POSES: tuple[Pose, ...] = (*AT_SIDE, TURNING)  # that are tried
 LAYER = 2.0  # over half a layer
+NOT_COMPARED = "not compared: its places are not resolved"
 TRIED = "poses tried by pilots"  # begins the clause of a reason that tells all of them
 Counted = Callable[[str, int], AbstractContextManager[Progress]]
 SAME = 0.999  # cosine between the directions that point up, from which on a pose is no other one
@@ -181,9 +182,7 @@ def _objection(one: Way, found: Measured, other: Way, of_other: Measured) -> str
     now, then = found.intensity, of_other.intensity
     if now is not None and then is not None and now.value < AS_STRONG * then.value:
         return "weaker"
-    time, other_time = (
-        x.time_to_98 * way.made.settings for x, way in ((found, one), (of_other, other))
-    )
+    time, other_time = _time(one), _time(other)
     if (
         of_other.time_to_98 > LONG
         and one.made.sonotrode_count <= SEVERAL
@@ -194,6 +193,17 @@ def _objection(one: Way, found: Measured, other: Way, of_other: Measured) -> str
     if ratio * time < QUICKER * other_time and (ratio >= 1.0 or time <= other_time):
         return ""
     return "hardly quicker" if ratio <= 1.0 else "not quick enough for more sonotrodes"
+
+
+def _time(one: Way) -> float:
+    """Return the time to 98 % in all settings of a way by a pilot [s]; inf without one."""
+    return math.inf if one.found is None else one.found.time_to_98 * one.made.settings
+
+
+def _is_rough(one: Way, best: Way) -> bool:
+    """Return whether a pilot told a way's time on average alone, but that of all places of best."""
+    both = one.found, best.found
+    return None not in both and [found.places for found in both if found] == [False, True]
 
 
 def _said(found: Measured | None) -> str:
@@ -219,6 +229,8 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
             if why and one.found.time_to_98 < best.found.time_to_98:
                 what += f" ({why})"
                 outcome = why
+        if _is_rough(one, best):
+            outcome = outcome or NOT_COMPARED
         count, found = one.made.sonotrode_count, one.found
         trials.append(
             PoseTrial(
@@ -239,6 +251,12 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
     pose, _, why = best.made.reasons["part.rotate_deg"].rpartition(": ")
     ball = first.made.tables["shot"]["diameter_mm"]  # those of the proposal may be others
     tried_ones = f"{TRIED} with balls of {ball:g} mm: {', '.join(texts)}"
+    for one, harm in tried:
+        if not harm and _is_rough(one, best) and _time(one) < HALF * _time(best):
+            tried_ones += (
+                f"; POSE NOT DECIDED: {named(one)}, {_said(one.found)}, may be quicker than what "
+                f"is proposed, {_said(best.found)}: propose it too (--pose), and simulate both"
+            )
     reason = f"{pose}: {why}; {tried_ones}" if best is first else f"{pose}: {tried_ones}"
     reasons = {**best.made.reasons, "part.rotate_deg": reason}
     return best._replace(made=replace(best.made, reasons=reasons, poses=tuple(trials)))

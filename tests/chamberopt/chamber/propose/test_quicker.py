@@ -19,8 +19,8 @@ from chamberopt.chamber.propose.held_proposal import rests
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, with_charge
 from chamberopt.chamber.propose.proposed_budget import Measured, TooSlowError
 from chamberopt.chamber.propose.proposed_steps import NOT_OVER, propose_second_pose, turned_over
-from chamberopt.chamber.propose.quicker import SEVERAL, Way, propose_quicker
-from chamberopt.chamber.propose.text import design_text
+from chamberopt.chamber.propose.quicker import NOT_COMPARED, SEVERAL, Way, propose_quicker
+from chamberopt.chamber.propose.text import design_text, to_settle
 from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.load import load_design
 from chamberopt.documents.proposal import proposal_in_words
@@ -133,6 +133,26 @@ def test_the_quicker_pose_is_taken_and_all_times_are_told(
     names = [row[0] for row in table.rows]
     assert names[0] == "on edge"
     assert {"lying", "evenly exposed"} <= {*names}
+
+
+def test_a_pose_whose_places_are_not_resolved_is_left_open_and_not_called_slower(
+    poses: dict[Pose | None, Proposal],
+) -> None:
+    first = Way(poses[None], Wanted("mm"), measured(2024.0))
+    of_all = pilots({None: 2024.0, "lying": 900.0, "on-edge": 512.0})
+    for seconds, is_open in ((1000.0, True), (1030.0, False)):
+
+        def measure(made: Proposal, longest: float = math.inf, x: float = seconds) -> Measured:
+            found = of_all(made, longest)
+            return measured(x, places=False) if found.time_to_98 == 512.0 else found
+
+        best = propose_quicker(first, of(poses), lambda made: made, measure)
+        assert best.found == measured(2024.0)
+        outcomes = {one.pose: one.outcome for one in best.made.poses}
+        assert outcomes["on edge"] == NOT_COMPARED
+        assert outcomes["evenly exposed"] == "taken"
+        told = to_settle(best.made, ())
+        assert any(one.startswith("POSE NOT DECIDED: on edge") for one in told) is is_open
 
 
 def test_a_lying_part_on_which_balls_would_rest_is_tried_turned_over(
