@@ -78,7 +78,7 @@ LEAST_ALONE = 6.5  # pt: with smaller letters than these on one page there are f
 DRAWING_PER_PT, MOST_DRAWING = 13.0, 125.0
 LEAST_OPENINGS = 110.0  # mm: with less room below the coverage they have a page of their own
 LEAST_SCALE = 0.5  # of the first page's drawing, below which there is a larger one on its own page
-CAPTION, ROW = 7.0, 8.0  # mm, of the caption, and of a row of the title block
+CAPTION, ROW = 9.5, 8.0  # mm, of the caption of three lines, and of a row of the title block
 FIELDS = 6  # in a row of the title block
 FOOT = MARGIN + 2.0 * ROW + 3.0  # mm, where the content ends
 RED = "#C00000"
@@ -545,7 +545,7 @@ def _drawing(
         limits, face: those of draw_sheet.
     """
     views = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall), limits, face)
-    Writer(axes, 6.0).write(f"{views}, {LEGEND}", MARGIN, top - tall, INNER, colour=DARK_GREY)
+    Writer(axes, 6.0).write(f"{views} {LEGEND}", MARGIN, top - tall, INNER, colour=DARK_GREY)
 
 
 def _further_steps(

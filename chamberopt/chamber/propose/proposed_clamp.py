@@ -145,5 +145,5 @@ def _clamp(made: Proposal) -> Clamp:
     ]
     areas = apart([(one, float(each.sum()), each) for one, each in known if each.any()])
     most = [(one, area) for one, area in areas if area > JAW_SHARE * areas[0][1]]
-    named = (f"{one.name} ({area_in_mm2(area)} of it)" for one, area in most[:MOST_JAWS])
-    return Clamp(", ".join(named))
+    named = [f"{one.name} ({area_in_mm2(area)} of it)" for one, area in most[:MOST_JAWS]]
+    return Clamp(f"{', '.join(named)}, in jaws of that form or potted" if named else "")

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 RASTER = 200  # dots an inch, for the part in the plan
 LEGEND = (
-    "inside dimensions in mm, without a tolerance by ISO 2768-m. Blue: target, in the plan also "
-    "where it is hidden. Grey: part. Orange: sonotrode. White: walls and lid, as thick as the shop "
-    "chooses."
+    "Inside dimensions in mm, without a tolerance by ISO 2768-m. Blue: target, in the plan also "
+    "where it is hidden. Grey: part. Orange: sonotrode. Black hatching: walls and lid, as thick as "
+    "the shop chooses."
 )
 
 
@@ -44,7 +44,7 @@ def draw_chamber(
     limits: Limits = MappingProxyType({}),
     face: Face | None = None,
 ) -> str:
-    """Draw sections and plan of a chamber on a page, and return what they are, with their scale.
+    """Draw sections and plan of a chamber on a page, and return what they are in sentences.
 
     Args:
         axes: axes of the whole page, in mm.
@@ -77,10 +77,10 @@ def draw_chamber(
     dashed, beyond = ([], "") if face is None else draw_face(axes, chamber, view, face)
     text = scale_in_words(scale)
     what = "Section A–A" if len(planes) == 1 else "Sections A–A and B–B"
-    jaws = ", white and crossed: jaws" if has_jaws else ""
-    dashes = f", dashed: {' and '.join(dashed)}" if dashed else ""
-    rim = f", not drawn: {beyond}" if beyond else ""
-    return f"{what} and plan, scale {text}{dashes}{rim}{jaws}"
+    jaws = " White and crossed: jaws." if has_jaws else ""
+    dashes = f" Dashed: {' and '.join(dashed)}." if dashed else ""
+    rim = f" Not drawn: {beyond}." if beyond else ""
+    return f"{what} and plan, scale {text}.{dashes}{rim}{jaws}"
 
 
 def drawing_height(chamber: Chamber, size: Point) -> float:

@@ -245,7 +245,7 @@ def test_jaws_are_drawn_where_the_part_stands_far_enough_out(
     axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
     told = draw_chamber(axes, build_chamber(design), 0.0, 100.0, (180.0, 100.0))
     assert [one.get_hatch() for one in axes.patches].count(JAWS) == jaws
-    assert ("white and crossed: jaws" in told) == bool(jaws)
+    assert ("White and crossed: jaws" in told) == bool(jaws)
 
 
 def test_strips_are_peened_after_parts_and_twice_of_their_saturation(folder: Path) -> None:

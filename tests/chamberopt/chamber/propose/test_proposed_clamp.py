@@ -42,7 +42,7 @@ def test_what_is_buried_in_another_body_is_no_jaw(monkeypatch: pytest.MonkeyPatc
         proposed_clamp, "rows_of", lambda _, keys: np.array(["SHAFT", "KEY"]) == keys["surface"][0]
     )
     made = SimpleNamespace(design=None, chamber=chamber, known=known)
-    assert _clamp(made).text == "SHAFT (500000 mm² of it)"  # type: ignore[arg-type]
+    assert _clamp(made).text == ("SHAFT (500000 mm² of it), in jaws of that form or potted")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -63,14 +63,14 @@ def test_the_section_shows_the_part() -> None:
     chamber = on_sonotrode(chamber)
     drawn = draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0))
     assert drawn.startswith("Sections A–A and B–B")
-    assert "dashed" not in drawn
+    assert "Dashed" not in drawn
     for face, text in (
         (Face(diameter_mm=40.0), ""),
-        (Face(size_mm=(78.0, 36.0)), ", dashed: the sonotrode's rim"),
+        (Face(size_mm=(78.0, 36.0)), " Dashed: the sonotrode's rim."),
         (Face(size_mm=(72.0, 72.0)), told_beyond(11, 20)),  # it would be cut off
         (
             Face(size_mm=(80.0, 80.0), columns=2),
-            f", dashed: the joints of the floor's blocks{told_beyond(55, 24)}",
+            f" Dashed: the joints of the floor's blocks.{told_beyond(55, 24)}",
         ),
     ):
         told = draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0), face=face)
@@ -80,7 +80,7 @@ def test_the_section_shows_the_part() -> None:
 def told_beyond(x: int, y: int) -> str:
     """How far a face that has no room in the plan goes on [mm], in words."""
     over = f"by {x} mm in x and {y} mm in y"
-    return f", not drawn: the sonotrode's face goes on beyond the walls {over}"
+    return f" Not drawn: the sonotrode's face goes on beyond the walls {over}."
 
 
 def test_a_drawing_takes_no_more_height_than_its_views() -> None:
