@@ -8,8 +8,8 @@ Definitions of *hopping* and *rattling* balls are in sim_core/loop/stays.py.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -107,8 +107,10 @@ def mean_trapped(found: Sequence[TrappedBalls]) -> TrappedBalls | None:
     if not found:
         return None
     worst = max(found, key=lambda one: (one.rattling_impacts, one.rattling_time))
-    means = (float(np.mean([getattr(one, name) for one in found])) for name in SHARES)
-    return TrappedBalls(*means, worst.place)
+    means: dict[str, Any] = {
+        name: float(np.mean([getattr(one, name) for one in found])) for name in SHARES
+    }
+    return replace(worst, **means)
 
 
 def jammed_text(mean: TrappedBalls, design: Design) -> str:
