@@ -255,7 +255,7 @@ def test_legs_outside_of_the_walls_hang_beside_the_sonotrode_or_stay_above_it(
     if farther:
         # What is over a millimetre brings the plate, its own lid, to half millimetres.
         assert 1e-3 - 1e-6 <= lowest < 1.5e-3
-        assert "above the sonotrode's face" in found.reasons["chamber.sonotrode_distance_mm"]
+        assert "above the rim of the sonotrode" in found.reasons["chamber.sonotrode_distance_mm"]
     else:
         assert distances[0] == pytest.approx(distances[1], abs=2e-3)  # of a higher part
         assert lowest < -0.05
