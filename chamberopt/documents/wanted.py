@@ -101,6 +101,11 @@ def _times(design: Design) -> float:
     return 1.0 if percent is None else percent / 100.0
 
 
+def may_be_too_short(result: Result) -> bool:
+    """Return whether a treatment time leaves the target bare, or is not certain to be enough."""
+    return any(one.warns for one in time_lines(result)[:1])
+
+
 def time_lines(result: Result) -> list[AnswerLine]:
     """Return whether the peening time is enough, for 98 % or for the coverage that is wanted.
 

@@ -295,10 +295,8 @@ def write_sheet(
     path = require_free_page(loaded.folder / SHEET if path is None else path, SHEET_FILE)
     with claim_file(path):
         arrays = load_result_arrays(loaded)
-        chamber, places = (
-            arrays.chamber,
-            looked_places(arrays, 1e-6 * loaded.record.field.gauge_mm2),
-        )
+        chamber = arrays.chamber
+        places = looked_places(arrays, 1e-6 * loaded.record.field.gauge_mm2)
         push = push_of_shot(loaded, arrays)
         design, part, openings = loaded.design, chamber.part, find_openings(chamber)
         clear = clearance_of(loaded)

@@ -133,10 +133,8 @@ def _needs_both_sides(one: Way, pose: Pose) -> bool:
 
 def _longest(made: Proposal, best: Way) -> float:
     """Return the time to 98 % [s] of a setting from which on a way is not taken instead of one."""
-    if best.found is None:
-        return math.inf
     share = QUICKER if made.sonotrode_count >= best.made.sonotrode_count else 1.0
-    return share * best.found.time_to_98 * best.made.settings / made.settings
+    return share * _time(best) / made.settings
 
 
 def _is_slow(way: Way) -> bool:
@@ -202,8 +200,9 @@ def _time(one: Way) -> float:
 
 def _is_rough(one: Way, best: Way) -> bool:
     """Return whether a pilot told a way's time on average alone, but that of all places of best."""
-    both = one.found, best.found
-    return None not in both and [found.places for found in both if found] == [False, True]
+    if one.found is None or best.found is None:
+        return False
+    return best.found.places and not one.found.places
 
 
 def _said(found: Measured | None) -> str:

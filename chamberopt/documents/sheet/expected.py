@@ -25,7 +25,7 @@ from chamberopt.documents.sheet.rows import (
     weighed_g,
     with_limits,
 )
-from chamberopt.documents.wanted import time_lines, wanted_rows
+from chamberopt.documents.wanted import may_be_too_short, wanted_rows
 from chamberopt.documents.wording import metric_label, plain
 from chamberopt.peening.strip import StripSize
 from chamberopt.peening.strip_holder import why_no_strip
@@ -66,9 +66,8 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
     Without a calibration, a row says why there is no intensity in mmA.
     """
     of_all = ", all steps together" if result.design.steps else ""
-    unset = any(one.warns for one in time_lines(result)[:1])
     time = f"{plain(result.design.process.treatment_time)} s{of_all}"
-    time += " to start with, NOT YET SET: see 3 peen" if unset else ""
+    time += " to start with, NOT YET SET: see 3 peen" if may_be_too_short(result) else ""
     yield "peening time", with_limits(result, "process.treatment_time_s", time)
     yield from wanted_rows(result)
     calibration = result.design.calibration

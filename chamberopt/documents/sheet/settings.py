@@ -38,7 +38,7 @@ from chamberopt.documents.sheet.rows import (
     with_limits,
 )
 from chamberopt.documents.study import exposed_target
-from chamberopt.documents.wanted import time_lines
+from chamberopt.documents.wanted import may_be_too_short
 from chamberopt.documents.wording import plain
 from chamberopt.documents.zones import turned
 
@@ -363,7 +363,7 @@ def run_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         f"{plain(one.process.treatment_time)} s as step {k}" for k, one in enumerate(steps, 1)
     )
     time = f"{plain(design.process.treatment_time)} s"
-    if any(one.warns for one in time_lines(result)[:1]):
+    if may_be_too_short(result):
         yield "3 peen", _not_set(result)
     else:
         yield "3 peen", f"{time}: {each} (see Steps)" if design.steps else time
