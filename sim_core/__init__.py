@@ -45,7 +45,7 @@ from sim_core.effects.surface.surface_effects import SurfaceEffects, surface_eff
 from sim_core.effects.vibration import AmplitudeProfile, Vibration
 from sim_core.errors import SceneError, SimulationError
 from sim_core.geometry.analytic import AnalyticCavity, cylinder_cavity, periodic_box, prism_cavity
-from sim_core.geometry.closest_point import ClosestPoints, closest_points
+from sim_core.geometry.closest_point import ClosestPoints, closest_on_each, closest_points
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.geometry.ray_length import ray_lengths
 from sim_core.geometry.sonotrode_border import largest_amplitude
@@ -95,6 +95,7 @@ __all__ = [
     "TriangleMesh",
     "Vibration",
     "can_rest",
+    "closest_on_each",
     "closest_points",
     "compile_simulator",
     "computed_once",

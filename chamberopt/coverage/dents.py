@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.flexure import mobility_of_part
-from chamberopt.geometry.triangles import closest_on_each, unit_normals
+from chamberopt.geometry.triangles import unit_normals
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -44,6 +44,8 @@ class Dents:
 
 def dents_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Dents:
     """Return the dents that impacts leave on the part; none for impacts below the yield speed."""
+    from sim_core import closest_on_each
+
     diameter = dent_diameters(impacts, chamber, design)
     dents = np.flatnonzero((diameter > 0.0) & (chamber.source[impacts.triangle] >= 0))
     corners = chamber.vertices[chamber.triangles[impacts.triangle[dents]]]

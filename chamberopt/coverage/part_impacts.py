@@ -16,7 +16,7 @@ from chamberopt.common.errors import InputError
 from chamberopt.common.limits import MAX_NUMBER
 from chamberopt.common.npz_files import UNREADABLE, read_arrays, save_arrays
 from chamberopt.coverage.dents import ball_diameters, dent_diameters, impact_angle_deg
-from chamberopt.geometry.triangles import closest_on_each, interpolate
+from chamberopt.geometry.triangles import interpolate
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -86,6 +86,8 @@ class HitsByTriangle:
 
 def hits_on_part(impacts: ImpactLog, chamber: Chamber, design: Design) -> Hits:
     """Return the impacts in a simulator log that hit the part."""
+    from sim_core import closest_on_each
+
     source = chamber.source[impacts.triangle]
     on_part = source >= 0
     speed = np.asarray(impacts.normal_speed)

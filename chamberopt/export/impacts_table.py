@@ -21,7 +21,6 @@ from chamberopt.common.versions import versions
 from chamberopt.coverage.dents import dent_diameters, impact_angle_deg
 from chamberopt.export.formats import FrameName
 from chamberopt.export.frame import MEANING, Frame, frame_of
-from chamberopt.geometry.triangles import closest_on_each
 from chamberopt.results.impacts import replica_count, simulate_impacts
 from chamberopt.results.rebuild import RebuiltChamber
 
@@ -143,6 +142,8 @@ def impact_rows(
     impacts: ReplicaImpacts, chamber: Chamber, design: Design, frame: Frame
 ) -> Iterator[ImpactRows]:
     """Yield the impacts of a replica in pieces of at most ROWS_AT_ONCE impacts."""
+    from sim_core import closest_on_each
+
     ball = np.asarray(design.shot.diameters, dtype=float)
     dents = dent_diameters(impacts.log, chamber, design)
     for begin in range(0, len(impacts.log), ROWS_AT_ONCE):

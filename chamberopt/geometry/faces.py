@@ -10,7 +10,6 @@ import numpy as np
 from chamberopt.geometry.triangles import (
     area_vectors,
     areas,
-    closest_on_each,
     connected_pieces,
     side_pairs,
     unit_vectors,
@@ -61,6 +60,8 @@ class Faces:
 
     def at(self, place: np.ndarray) -> tuple[int, float]:
         """Return the number of the face closest to a point (3,) [m], and its distance [m]."""
+        from sim_core import closest_on_each
+
         points = closest_on_each(self._corners, np.broadcast_to(place, (len(self._corners), 3)))
         away = np.linalg.norm(points - place, axis=1)
         return int(self.of_triangle[away.argmin()]), float(away.min())

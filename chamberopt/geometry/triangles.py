@@ -273,19 +273,6 @@ def angles_between(one: np.ndarray, two: np.ndarray) -> np.ndarray:
     return np.asarray(2.0 * np.arcsin(np.clip(half, 0.0, 1.0)))
 
 
-def closest_on_each(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the point on each triangle that is closest to this triangle's given point, (n, 3) [m].
-
-    Args:
-        corners, points: corners (n, 3, 3) and given point (n, 3) of each triangle [m].
-    """
-    from trimesh.triangles import closest_point
-
-    # In mm, because trimesh takes fourth powers of lengths below 1e-13 for zero. In metres this
-    # would already hold for a triangle of half a millimetre.
-    return np.asarray(closest_point(corners * 1e3, points * 1e3)) * 1e-3 if len(points) else points
-
-
 def rotation_matrix(degrees: tuple[float, float, float]) -> np.ndarray:
     """Return the matrix (3, 3) of rotations about the fixed axes x, then y, then z.
 

@@ -15,7 +15,7 @@ import numpy as np
 from chamberopt.chamber.checks.place_names import around, surface_names
 from chamberopt.common.number_text import percent
 from chamberopt.design.shape_surface import TAG_PART
-from chamberopt.geometry.triangles import closest_on_each, connected_pieces
+from chamberopt.geometry.triangles import connected_pieces
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -122,6 +122,8 @@ def triangles_near(
     chamber: Chamber, triangles: np.ndarray, position: np.ndarray, reach: float
 ) -> np.ndarray:
     """Return the numbers of the given triangles that are within `reach` [m] of a position (3,)."""
+    from sim_core import closest_on_each
+
     corners = chamber.vertices[chamber.triangles[triangles]]
     low, high = corners.min(axis=1), corners.max(axis=1)
     near = (np.abs(position - np.clip(position, low, high)) <= reach).all(axis=1)

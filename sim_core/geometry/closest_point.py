@@ -1,4 +1,4 @@
-"""Search for the surface points closest to many places (positions in the cavity) at once.
+"""Find the surface points closest to many places (positions in the cavity) at once.
 
 The walk through the tree of boxes leaves out boxes that are farther than the closest point found so
 far. The distance of a place is also the radius of the largest ball that fits with its centre there.
@@ -77,6 +77,26 @@ def closest_points(
                 )
             ]
     return found._replace(point=found.point + middle)
+
+
+def closest_on_each(corners: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the point on each triangle that is closest to this triangle's given place, (n, 3) [m].
+
+    Args:
+        corners, places: corners (n, 3, 3) and given place (n, 3) of each triangle [m].
+    """
+    numbers = np.ascontiguousarray(corners, dtype=np.float64).reshape(len(corners), 9)
+    found = np.array(places, dtype=np.float64)
+    _move_to_each(numbers, found)
+    return found
+
+
+@jit
+def _move_to_each(numbers: np.ndarray, place: np.ndarray) -> None:
+    """Move each place to the closest point of the triangle in the same row of ``numbers``."""
+    for i in range(len(place)):
+        point = _point_on_triangle(numbers, i, Vec3(place[i, 0], place[i, 1], place[i, 2]))
+        place[i, 0], place[i, 1], place[i, 2] = point.x, point.y, point.z
 
 
 @computed_once(8)

@@ -10,7 +10,6 @@ from chamberopt.geometry.triangles import (
     areas,
     border_edges,
     centre_of_mass,
-    closest_on_each,
     count_up,
     facet_normals,
     find_shells,
@@ -29,17 +28,6 @@ from chamberopt.geometry.triangles import (
     unique_rows,
     winding_number,
 )
-
-
-@pytest.mark.parametrize("size", [1.0, 5e-4, 5e-5])
-def test_contact_is_the_nearest_point_of_the_triangle(size: float) -> None:
-    """Also for small triangles: a library's tolerance once moved contacts by 0.1 mm."""
-    corners = np.tile(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), (4, 1, 1))
-    balls = np.array([[0.2, 0.2, 0.5], [0.5, -0.3, 0.4], [-1.0, -1.0, 0.1], [0.7, 0.01, 1.0]])
-    contacts = np.array([[0.2, 0.2, 0], [0.5, 0, 0], [0, 0, 0], [0.7, 0.01, 0]])
-    np.testing.assert_allclose(
-        closest_on_each(size * corners, size * balls), size * contacts, atol=1e-12 * size
-    )
 
 
 def test_pieces_of_a_surface_and_their_volumes() -> None:

@@ -6,14 +6,14 @@ import trimesh
 
 from chamberopt.chamber.build import Chamber
 from chamberopt.chamber.part import Part
-from chamberopt.geometry.triangles import closest_on_each, unit_normals
+from chamberopt.geometry.triangles import unit_normals
 from chamberopt.simulation.resting_balls import (
     RestingBalls,
     find_resting_balls,
     resting_notes,
     triangles_near,
 )
-from sim_core import Resting
+from sim_core import Resting, closest_on_each
 from tests.helpers.scenes.cavities import box_around
 
 BALL = 3e-3  # m

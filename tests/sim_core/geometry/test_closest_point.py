@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from sim_core import SceneError, TriangleMesh, closest_points
+from sim_core import SceneError, TriangleMesh, closest_on_each, closest_points
 from sim_core.scene.invariants import clearance
 from tests.helpers.scenes.cavities import CEILING, FLOOR, box, box_around
 
@@ -62,3 +62,27 @@ def test_a_needle_is_no_worse_than_a_line() -> None:
     mesh = TriangleMesh(corners, np.array(triangles), np.zeros(8))
     found = closest_points(mesh, np.array([[0.3, -2.0, 0.0]]), 10.0)
     np.testing.assert_allclose(found.distance, 2.0)
+
+
+@pytest.mark.parametrize("size", [1.0, 5e-4, 5e-5])
+def test_contact_is_the_nearest_point_of_the_triangle(size: float) -> None:
+    """Also for small triangles: a library's tolerance once moved contacts by 0.1 mm."""
+    corners = np.tile(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), (4, 1, 1))
+    balls = np.array([[0.2, 0.2, 0.5], [0.5, -0.3, 0.4], [-1.0, -1.0, 0.1], [0.7, 0.01, 1.0]])
+    contacts = np.array([[0.2, 0.2, 0], [0.5, 0, 0], [0, 0, 0], [0.7, 0.01, 0]])
+    np.testing.assert_allclose(
+        closest_on_each(size * corners, size * balls), size * contacts, atol=1e-12 * size
+    )
+
+
+def test_each_triangle_is_asked_about_its_own_place() -> None:
+    """As a search in a mesh of this triangle alone, in any order of its corners."""
+    rng = np.random.default_rng(2)
+    corners, places = rng.normal(0.0, 3e-3, (40, 3, 3)), rng.normal(0.0, 6e-3, (40, 3))
+    found = closest_on_each(corners, places)
+    for own, place, point in zip(corners, places, found, strict=True):
+        away = clearance(own[None], place[None], 1.0)[0]
+        assert np.linalg.norm(point - place) == pytest.approx(away, abs=1e-15)
+        assert clearance(own[None], point[None], 1.0)[0] < 1e-15
+    np.testing.assert_allclose(closest_on_each(corners[:, [2, 0, 1]], places), found, atol=1e-15)
+    assert closest_on_each(corners[:0], places[:0]).shape == (0, 3)
