@@ -2,17 +2,23 @@
 
     python benchmarks/mutants.py --seeds 20 --first 0
     python benchmarks/mutants.py --seeds 1 --first 7 --show
-    python benchmarks/mutants.py --seeds 20 --first 0 --wide
+    python benchmarks/mutants.py --seeds 20 --first 0 --map .coverage
 
 Each seed draws a file of the program that has a file of tests of its own, and puts one fault into
 it: an operator or comparison becomes its opposite, a number grows by a half, a small whole one to
 its successor and one that guards against rounding a thousandfold, a term of a sum or a factor of a
 product is dropped, a condition is turned round. The tests of that file run on a copy of the
-program, without the fault and with it; a fault that they pass is missed, with `--wide` only if all
-tests of their folder pass it too. Faults that change nothing count as missed, so the share is a
-lower bound. Lines for people (messages, descriptions), and what says how lines and legends of a
-drawing look, get no faults. A fault in the simulator's compiled code takes minutes, as all is
-compiled anew. Faults in constants of a file and in its code are counted apart.
+program, without the fault and with it. A fault that they pass is missed. With `--map` it is missed
+only if all tests pass it that run its lines, by the map of a run of all tests in this folder, with
+pytest-cov:
+
+    python -m pytest --cov=chamberopt --cov=sim_core --cov-context=test --cov-report=
+
+Compiled code and child processes leave no lines in the map; there the tests of the folder run.
+Faults that change nothing count as missed, so the share is a lower bound. Lines for people
+(messages, descriptions), and what says how lines and legends of a drawing look, get no faults. A
+fault in the simulator's compiled code takes minutes, as all is compiled anew. Faults in constants
+of a file and in its code are counted apart.
 """
 
 from __future__ import annotations
@@ -21,6 +27,7 @@ import argparse
 import ast
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -47,8 +54,8 @@ LOOKS = {
 CHOICE, CODE = "choice", "code"
 MANY = 10  # the successor of a whole number from here on is hardly another one
 ROUNDING = 1e-6  # numbers below it guard against rounding: a half more would change nothing
-# Of the tests of a file, and of a folder; a fault that makes them longer is caught.
-LONGEST_S, LONGEST_OF_FOLDER_S = 600.0, 3600.0
+# Of the tests of a file, and of all; a fault that makes them longer is caught.
+LONGEST_S, LONGEST_OF_ALL_S = 600.0, 3600.0
 
 
 def mirrored(packages: tuple[str, ...]) -> list[tuple[Path, Path]]:
@@ -70,14 +77,15 @@ class Faults(ast.NodeTransformer):
     """
 
     def __init__(self, chosen: int = -1) -> None:
-        self.count, self._chosen, self.text = 0, chosen, ""
+        self.count, self._chosen, self.text, self.line = 0, chosen, "", 0
         self.kind, self._now = CODE, CODE
 
     def _is_chosen(self, node: ast.AST, text: str) -> bool:
         self.count += 1
         if self.count - 1 != self._chosen:
             return False
-        self.text, self.kind = f"line {getattr(node, 'lineno', '?')}: {text}", self._now
+        self.line, self.kind = getattr(node, "lineno", 1), self._now
+        self.text = f"line {self.line}: {text}"
         return True
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.AST:
@@ -164,15 +172,41 @@ def drawn(seeds: range, packages: tuple[str, ...]) -> Iterator[tuple[int, Path, 
         yield seed, own, test, text, fault
 
 
-def is_caught(copy: Path, own: Path, test: Path, text: str) -> bool:
-    """Whether the tests fail with the fault in the copy, which is mended afterwards.
+def lines_of(source: str, fault: Faults) -> set[int]:
+    """The lines that run a fault: its statement, or of a constant all that name it."""
+    holds = [
+        node for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.stmt) and node.lineno <= fault.line <= (node.end_lineno or 0)
+    ]  # fmt: skip
+    inner = min(holds, key=lambda node: (node.end_lineno or 0) - node.lineno)
+    if fault.kind == CODE:
+        return set(range(inner.lineno, (inner.end_lineno or 0) + 1))
+    lines = source.splitlines()
+    names = re.findall(r"\b[A-Z][A-Z0-9_]+\b", lines[inner.lineno - 1].partition("=")[0])
+    used = re.compile(rf"\b({'|'.join(names)})\b")
+    return {k for k, line in enumerate(lines, 1) if used.search(line)}
+
+
+def running(lines: set[int], own: Path, database: Path) -> list[str]:
+    """The tests that run some lines of a file, by the map of `--map`."""
+    from coverage import CoverageData
+
+    data = CoverageData(str(database))
+    data.read()
+    by_line = data.contexts_by_lineno(str(ROOT / own))
+    return sorted({one.partition("|")[0] for line in lines for one in by_line.get(line, ()) if one})
+
+
+def is_caught(copy: Path, own: Path, tests: list[str], text: str) -> bool:
+    """Whether tests fail with the fault in the copy, which is mended afterwards.
 
     Args:
-        test: a file or a folder of tests.
+        tests: files, folders or names of single tests.
     """
     (copy / own).write_text(text, "utf-8")
-    workers, longest = ("1", LONGEST_S) if test.suffix else ("auto", LONGEST_OF_FOLDER_S)
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", workers, str(test)]
+    one_file = len(tests) == 1 and tests[0].endswith(".py")
+    workers, longest = ("1", LONGEST_S) if one_file else ("auto", LONGEST_OF_ALL_S)
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", workers, *tests]
     environment = {**os.environ, "PYTHONPATH": str(copy)}
     try:
         ended = subprocess.run(
@@ -190,12 +224,12 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--packages", default="chamberopt,sim_core")
-    parser.add_argument("--wide", action="store_true", help="ask the tests of the folder too")
+    parser.add_argument("--map", type=Path, help="ask all tests that run the fault, by this map")
     parser.add_argument("--show", action="store_true", help="tell the faults, run no tests")
     options = parser.parse_args()
     seeds = range(options.first, options.first + options.seeds)
     faults, rows = drawn(seeds, tuple(options.packages.split(","))), []
-    passed: set[Path] = set()  # files of tests that pass without a fault
+    passed: set[Path] = set()  # files whose tests pass without a fault
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder)
         if not options.show:
@@ -204,14 +238,15 @@ def main() -> None:
             shutil.copy(ROOT / "pyproject.toml", copy)
         for seed, own, test, text, fault in faults:
             caught: bool | str = "not run"
-            for tests in () if options.show else (test, test.parent)[: 1 + options.wide]:
-                if tests not in passed:
-                    if is_caught(copy, own, tests, (ROOT / own).read_text("utf-8")):
-                        sys.exit(f"{tests} fails without a fault")
-                    passed.add(tests)
-                caught = is_caught(copy, own, tests, text)
-                if caught:
-                    break
+            if not options.show:
+                source = (ROOT / own).read_text("utf-8")
+                if test not in passed and is_caught(copy, own, [str(test)], source):
+                    sys.exit(f"{test} fails without a fault")
+                passed.add(test)
+                caught = is_caught(copy, own, [str(test)], text)
+                if not caught and options.map:
+                    found = running(lines_of(source, fault), own, options.map)
+                    caught = is_caught(copy, own, found or [str(test.parent)], text)
             rows.append((fault.kind, caught))
             print(seed, own.as_posix(), fault.kind, fault.text, caught, sep="  ", flush=True)
     if not options.show:
