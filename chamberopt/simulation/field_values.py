@@ -156,19 +156,26 @@ class PartField:
         """
         from chamberopt.coverage.field.display_mesh import DisplayField, display_mesh
 
-        part, asked = self._chamber.part, list[_Seen]()
+        part, asked, numbers = self._chamber.part, list[_Seen](), list[np.ndarray]()
 
         def coverage(places: Places) -> np.ndarray:
-            asked.append(self._seen(places, self._gauge_off_creases(places)))
-            density = asked[-1].dents["dent_density"]
-            return np.where(asked[-1].reachable, coverage_from_dent_density(density), np.nan)
+            rows, which = self.field.distinct(places)
+            own, before = places.select(rows), sum(len(one.reachable) for one in asked)
+            seen = self._seen(own, self._gauge_off_creases(own))
+            asked.append(seen)
+            numbers.append(before + which)
+            density = seen.dents["dent_density"]
+            found = np.where(seen.reachable, coverage_from_dent_density(density), np.nan)
+            return np.asarray(found[which])
 
         mesh, asked_at = display_mesh(
             part.vertices, part.triangles, part.corner_normals, part.target, self.field.drawn_face,
             self.field.setting.gauge, coverage,
         )  # fmt: skip
-        windows = self.field.windows_round(mesh.places, self.field.radius)
-        values = self._values(mesh.places, _joined(asked, asked_at, windows))
+        rows, which = self.field.distinct(mesh.places)
+        windows = self.field.windows_round(mesh.places.select(rows), self.field.radius)
+        seen = _joined(asked, np.concatenate(numbers)[asked_at[rows]], windows)
+        values = self._values(seen, which) | self._moved(mesh.places)
         fields = {name: one.astype(np.float32) for name, one in values.items()}
         return DisplayField(replace(mesh, normal=mesh.normal.astype(np.float32)), fields)
 
@@ -201,23 +208,30 @@ class PartField:
             surface_stress_MPa: residual stress at the surface [MPa]; where the design asks for it.
             moved_um: distance of the surface from the file's facets [µm]; absent if none moved.
         """
-        return self._values(
-            places, self._seen(places, self.field.gauge_round(places, self.field.radius))
-        )
+        rows, which = self.field.distinct(places)
+        own = places.select(rows)
+        seen = self._seen(own, self.field.gauge_round(own, self.field.radius))
+        return self._values(seen, which) | self._moved(places)
 
-    def _values(self, places: Places, seen: _Seen) -> dict[str, np.ndarray]:
+    def _values(self, seen: _Seen, which: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the figures of `values` but moved_um, (p,) by name.
+
+        Args:
+            seen: what was seen in windows round the distinct points.
+            which: number of each point among the distinct points, (p,).
+        """
         gauge, fits = seen.gauge, seen.reachable & np.isfinite(seen.gauge.area)
         found = seen.dents | self._impacts(gauge)
         known = {name: np.where(fits, column, np.nan) for name, column in found.items()}
         coverage = coverage_from_dent_density(found["dent_density"])
         enough = fits & (found["coverage_interval"] <= WIDEST)
-        return {
+        columns = {
             "coverage": np.where(fits, coverage, 0.0),
             "reachable": fits.astype(float),
             **known,
             "resolved": enough.astype(float),
-            **self._moved(places),
         }
+        return {name: column[which] for name, column in columns.items()}
 
     def stress_profiles(self, metrics: Mapping[str, Estimate]) -> dict[str, SurfaceProfile]:
         """Return the stress under the target and under each zone, by "the target" or its name.

@@ -31,7 +31,7 @@ from chamberopt.coverage.field.crease_bands import (
 from chamberopt.coverage.field.smooth_faces import Creases, Faces, find_faces
 from chamberopt.coverage.field.surface_points import Reach, ball_fits, reach_from, spread_points
 from chamberopt.coverage.field.symmetry import TOLERANCE, Symmetry, find_symmetry
-from chamberopt.geometry.triangles import areas, unit_normals
+from chamberopt.geometry.triangles import areas, unique_rows, unit_normals
 from sim_core import computed_once
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ OF_WIDE = 0.125  # number of windows of twice the radius, which overlap more, ov
 MOST_AREA, MOST_OVERLAP, FEWEST_WINDOWS = 0.2, 20.0, 200
 POINTS_OF_ZONE = 1000  # points of a zone that are tested for a ball before any work
 POINTS_PER_CHOSEN = 2  # points tested for a ball, for each middle of a window
+SAME_NORMAL = 1e-3  # rad between normals of points that are one after a turn
 MIN_WINDOWS = 2.0  # windows side by side on a target, to show its evenness
 PIECES_PER_WINDOW = 6  # most pieces of surface, far from the border of the touchable surface
 MAX_PIECES, MAX_PIECES_OFF_TARGET = 3e6, 4e5  # pieces off the target are only for pictures
@@ -227,6 +228,20 @@ class TargetField:
         place[lost], triangle[lost] = hits.place[rows[lost]], hits.triangle[rows[lost]]
         return replace(
             hits.select(rows), place=place.astype(np.float32), triangle=triangle.astype(np.int32)
+        )
+
+    def distinct(self, points: Places) -> tuple[np.ndarray, np.ndarray]:
+        """Return rows of points (k,) no two of which a turn of a symmetric chamber makes one, and
+        for each point (p,) its number among them.
+
+        Windows round alike points have the same figures, so that one of them tells all.
+        """
+        if self.symmetry is None:
+            every = np.arange(len(points.place))
+            return every, every
+        place, normal, face = self._points_in_sector(points)
+        return unique_rows(
+            np.column_stack([np.round(place / TOLERANCE), np.round(normal / SAME_NORMAL), face])
         )
 
     def _points_in_sector(self, points: Places) -> Places:

@@ -8,9 +8,12 @@ import pytest
 from benchmarks.facet_invariance import cases
 from chamberopt.chamber.build import build_chamber
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
+from chamberopt.coverage.field.smooth_faces import Places
+from chamberopt.coverage.field.symmetry import turn_about_axis
 from chamberopt.pictures.quantities import QUANTITIES
 from chamberopt.simulation.evaluation import Evaluation
 from chamberopt.simulation.field_values import PartField, _quantile, density_bounds
+from tests.chamberopt.coverage.field.test_symmetry import cube
 from tests.helpers.synthetic import (
     ANGLE,
     SPEED,
@@ -154,3 +157,19 @@ def test_the_90th_percentile_is_what_nine_of_ten_do_not_exceed() -> None:
     counts[1, :16] = 5.0
     assert _quantile(counts, 0.9)[:2] == pytest.approx([0.9, 0.45])
     assert np.isnan(_quantile(counts, 0.9)[2])
+
+
+def test_a_point_tells_what_the_points_tell_to_which_turns_bring_it() -> None:
+    """On a cube in a square room: to the last bit, as one window is looked at for all four."""
+    chamber, design = cube(), plate_design()
+    hits = random_dents(design, chamber, 5e7 * chamber.exposed_area, np.random.default_rng(3))
+    seen = PartField(design, chamber, evaluation_of(design, chamber, [hits] * 3))
+    assert seen.field.symmetry is not None
+    points = seen.field.some_points(200)
+    angle = np.repeat(np.arange(4), 200) * np.pi / 2.0
+    place, normal = (turn_about_axis(np.tile(one, (4, 1)), angle) for one in points[:2])
+    face = seen.field.face[seen.field.symmetry.triangles_at(place)]
+    found = seen.values(Places(place, normal, face))
+    assert np.ptp(found["coverage"][:200]) > 0.1
+    for column in found.values():
+        np.testing.assert_array_equal(column.reshape(4, 200), np.tile(column[:200], (4, 1)))

@@ -8,6 +8,7 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.coverage.coverage_from_impacts import find_footprints
 from chamberopt.coverage.field import target_field
+from chamberopt.coverage.field.smooth_faces import Places
 from chamberopt.coverage.field.symmetry import Symmetry, find_symmetry, turn_about_axis
 from chamberopt.coverage.field.target_field import WindowSetting, find_target_field
 from chamberopt.design.load import load_design
@@ -127,8 +128,6 @@ def test_triangles_that_reach_the_sector_are_as_many_in_each_turn(copies: int) -
 
 def test_a_pattern_that_has_the_symmetry_stays_as_it_is() -> None:
     """More dents in the middle of each side: the values at places do not move."""
-    from chamberopt.coverage.field.smooth_faces import Places
-
     chamber, design = cube(), plate_design()
     middle = chamber.part.vertices[chamber.part.triangles].mean(axis=1)
     beside = np.sort(np.abs(middle), axis=1)[:, 1]  # the larger of two distances from the middle
@@ -146,3 +145,22 @@ def test_a_pattern_that_has_the_symmetry_stays_as_it_is() -> None:
     assert density[:4] == pytest.approx(np.full(4, 2e8 * np.pi / 4.0 * 0.3e-3**2), rel=0.1)
     assert np.allclose(density[:4], density[0])
     assert np.allclose(density[4:], 0.0)
+
+
+def test_points_that_turns_bring_to_one_another_are_one_point() -> None:
+    """And no others: not with their normals the other way, and none without symmetry."""
+    chamber = cube()
+    field = find_target_field(chamber, chamber_mesh(chamber), SETTING._replace(symmetric=True))
+    points = field.some_points(300)
+    angle = np.repeat(np.arange(4), 300) * np.pi / 2.0
+    turned = [turn_about_axis(np.tile(one, (4, 1)), angle) for one in points[:2]]
+    face = field.face[field.symmetry.triangles_at(turned[0])] if field.symmetry else points.face
+    rows, which = field.distinct(Places(*turned, face))
+    assert 300 <= len(rows) <= 303  # one at a border of two sectors, or of two cells, is not seen
+    assert (which.reshape(4, 300) == which[:300]).mean() > 0.99
+    np.testing.assert_array_equal(which[rows], np.arange(len(rows)))
+    opposite = Places(turned[0], np.r_[turned[1][:300], -turned[1][300:]], face)
+    assert 600 <= len(field.distinct(opposite)[0]) <= 606
+
+    plain = find_target_field(chamber, chamber_mesh(chamber), SETTING._replace(symmetric=False))
+    assert len(plain.distinct(Places(*turned, face))[0]) == 1200
