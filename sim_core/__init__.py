@@ -46,6 +46,7 @@ from sim_core.effects.vibration import AmplitudeProfile, Vibration
 from sim_core.errors import SceneError, SimulationError
 from sim_core.geometry.analytic import AnalyticCavity, cylinder_cavity, periodic_box, prism_cavity
 from sim_core.geometry.closest_point import ClosestPoints, closest_on_each, closest_points
+from sim_core.geometry.largest_ball import largest_balls
 from sim_core.geometry.mesh import TriangleMesh
 from sim_core.geometry.ray_length import ray_lengths
 from sim_core.geometry.sonotrode_border import largest_amplitude
@@ -106,6 +107,7 @@ __all__ = [
     "is_compiled",
     "jit",
     "largest_amplitude",
+    "largest_balls",
     "pack_balls",
     "periodic_box",
     "plate_mobility",

@@ -1,10 +1,4 @@
-"""Find the largest ball that touches the cavity's surface at a point and crosses it nowhere.
-
-A large ball that touches at the point is shrunk until it clears the closest obstacle, again and
-again until no obstacle is left.
-
-Source: J. Ma, S. W. Bae, S. Choi, The Visual Computer 28 (2012) 7.
-"""
+"""Spread points over a cavity's surface, and find the largest ball that touches at each point."""
 
 from __future__ import annotations
 
@@ -16,8 +10,6 @@ from chamberopt.geometry.triangles import EVEN_STEP, areas, interpolate, on_tria
 
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
-
-MAX_SHRINKS = 50  # 5 are usual
 
 
 class TouchPoints(NamedTuple):
@@ -62,6 +54,8 @@ def find_touch_points(
         chosen: marks the triangles whose points are wanted, (m,) bool; None for all. Their points
             do not depend on the choice.
     """
+    from sim_core import largest_balls
+
     triangle, point, area = spread_points(mesh.vertices, mesh.triangles, spacing, chosen)
     # Where the normals of all corners are equal there is nothing to interpolate.
     normal = np.ascontiguousarray(normals[triangle, 0])
@@ -99,46 +93,3 @@ def spread_points(
     u, v = ((1.0 / 3.0 + number[:, None] * EVEN_STEP) % 1.0).T
     point = on_triangles(vertices[triangles[triangle]], u, v)
     return triangle, point, (size / np.maximum(count, 1))[triangle]
-
-
-def largest_balls(
-    mesh: TriangleMesh, point: np.ndarray, normal: np.ndarray, max_radius: float, overlap: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find the largest ball that touches a mesh at each point.
-
-    Returns its radius [m], the triangle that limits it (-1 if none does), and the cosine between
-    the normals of point and triangle, (p,) each.
-
-    A ball of radius R that touches at p, where the normal is n, has its centre at p + R n. It
-    reaches into another surface, at the point q, by the depth o if |q - p - R n| = R - o.
-
-    Args:
-        point, normal: points [m] and unit normals into the cavity there, (p, 3) each.
-        max_radius: limit of the radius [m].
-        overlap: the allowed depth o [m].
-    """
-    from sim_core import closest_points
-
-    radius = np.full(len(point), max_radius)
-    obstacle, cosine = np.full(len(point), -1), np.zeros(len(point))
-    rows = np.arange(len(point))
-    for _ in range(MAX_SHRINKS):
-        centre = point[rows] + radius[rows, None] * normal[rows]
-        found = closest_points(mesh, centre, radius[rows] - overlap)
-        hit = found.triangle >= 0
-        rows = rows[hit]
-        if not len(rows):
-            break
-        to = found.point[hit] - point[rows]
-        ahead = np.einsum("ij,ij->i", to, normal[rows]) - overlap
-        square = np.einsum("ij,ij->i", to, to) - overlap**2
-        fits = np.divide(
-            square, 2.0 * ahead, out=np.zeros_like(ahead), where=(ahead > 0.0) & (square > 0.0)
-        )
-        obstacle[rows] = found.triangle[hit]
-        shrunk = fits < (1.0 - 1e-9) * radius[rows]
-        radius[rows] = np.minimum(np.maximum(fits, overlap), radius[rows])
-        across = np.einsum("ij,ij->i", point[rows] - found.point[hit], normal[rows]) + radius[rows]
-        cosine[rows] = across / np.maximum(radius[rows] - overlap, overlap)
-        rows = rows[shrunk & (fits > overlap)]
-    return radius, obstacle, cosine

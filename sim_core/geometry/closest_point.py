@@ -9,6 +9,7 @@ triangle.
 
 import math
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
@@ -60,23 +61,24 @@ def closest_points(
         np.full(len(places), -1, dtype=np.int32),
         np.ascontiguousarray(places, dtype=np.float64) - middle,
     )
-    tree = _tree_of(mesh, tag)
+    tree = tree_of(mesh, tag)
 
     def find(rows: slice) -> None:
         part = ClosestPoints(*(column[rows] for column in found))  # views
         _find(tree, part, np.zeros(STACK, dtype=np.int32), np.zeros(STACK))
 
-    parts = -(-len(places) // PER_THREAD)
-    if parts <= 1:
-        find(slice(None))
-    else:
-        with ThreadPoolExecutor(min(parts, os.cpu_count() or 1), "closest points") as threads:
-            [
-                *threads.map(
-                    find, (slice(k * PER_THREAD, (k + 1) * PER_THREAD) for k in range(parts))
-                )
-            ]
+    on_threads(find, len(places))
     return found._replace(point=found.point + middle)
+
+
+def on_threads(work: Callable[[slice], None], count: int) -> None:
+    """Call ``work`` with slices of so many rows, several at once; compiled code does not wait."""
+    parts = [slice(k, k + PER_THREAD) for k in range(0, count, PER_THREAD)]
+    if len(parts) <= 1:
+        work(slice(None))
+        return
+    with ThreadPoolExecutor(min(len(parts), os.cpu_count() or 1), "closest points") as threads:
+        [*threads.map(work, parts)]
 
 
 def closest_on_each(corners: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -95,12 +97,12 @@ def closest_on_each(corners: np.ndarray, places: np.ndarray) -> np.ndarray:
 def _move_to_each(numbers: np.ndarray, place: np.ndarray) -> None:
     """Move each place to the closest point of the triangle in the same row of ``numbers``."""
     for i in range(len(place)):
-        point = _point_on_triangle(numbers, i, Vec3(place[i, 0], place[i, 1], place[i, 2]))
+        point = point_on_triangle(numbers, i, Vec3(place[i, 0], place[i, 1], place[i, 2]))
         place[i, 0], place[i, 1], place[i, 2] = point.x, point.y, point.z
 
 
 @computed_once(8)
-def _tree_of(mesh: TriangleMesh, tag: int | None) -> Tree:
+def tree_of(mesh: TriangleMesh, tag: int | None) -> Tree:
     """Return a search tree of the triangles of one tag; None means all triangles.
 
     Each obstacle holds a triangle's nine coordinates.
@@ -136,7 +138,7 @@ def _find(tree: Tree, found: ClosestPoints, stack: np.ndarray, entry: np.ndarray
             node = stack[size]
             first = size
             for child in range(BOXES):
-                away = _box_distance_squared(tree.bounds, node, child, at)
+                away = box_distance_squared(tree.bounds, node, child, at)
                 if away >= least:
                     continue
                 number = tree.children[node, child]
@@ -144,7 +146,7 @@ def _find(tree: Tree, found: ClosestPoints, stack: np.ndarray, entry: np.ndarray
                     stack[size], entry[size] = number, away
                     size += 1
                     continue
-                point = _point_on_triangle(tree.numbers, -1 - number, at)
+                point = point_on_triangle(tree.numbers, -1 - number, at)
                 offset = sub(at, point)
                 if dot(offset, offset) < least:
                     least = dot(offset, offset)
@@ -163,7 +165,7 @@ def _find(tree: Tree, found: ClosestPoints, stack: np.ndarray, entry: np.ndarray
 
 
 @jit
-def _box_distance_squared(bounds: np.ndarray, node: int, child: int, at: Vec3) -> float:
+def box_distance_squared(bounds: np.ndarray, node: int, child: int, at: Vec3) -> float:
     x = max(bounds[node, 0, child] - at.x, at.x - bounds[node, 3, child], 0.0)
     y = max(bounds[node, 1, child] - at.y, at.y - bounds[node, 4, child], 0.0)
     z = max(bounds[node, 2, child] - at.z, at.z - bounds[node, 5, child], 0.0)
@@ -171,7 +173,7 @@ def _box_distance_squared(bounds: np.ndarray, node: int, child: int, at: Vec3) -
 
 
 @jit
-def _point_on_triangle(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
+def point_on_triangle(numbers: np.ndarray, row: int, at: Vec3) -> Vec3:
     """Return the point of triangle ``row`` that is closest to the place ``at`` [m]."""
     a = Vec3(numbers[row, 0], numbers[row, 1], numbers[row, 2])
     b = Vec3(numbers[row, 3], numbers[row, 4], numbers[row, 5])

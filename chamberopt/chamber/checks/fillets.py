@@ -15,7 +15,6 @@ import numpy as np
 from chamberopt.chamber.checks.jams import MAX_COSINE
 from chamberopt.chamber.checks.place_names import one_of
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
-from chamberopt.chamber.largest_ball import largest_balls
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
 from chamberopt.design.shape_surface import TAG_PART
 from chamberopt.geometry.smoothing.fillets import face_at, faces_of, fillets_of
@@ -284,6 +283,8 @@ def _slots(
         chosen: marks part triangles on the target or a zone, (m,).
         largest: diameter of the largest ball [m].
     """
+    from sim_core import largest_balls
+
     mesh, touches = reach.mesh, reach.touches
     source = chamber.source[touches.triangle]
     own = np.flatnonzero((source >= 0) & chosen[np.maximum(source, 0)])

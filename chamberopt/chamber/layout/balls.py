@@ -19,7 +19,7 @@ import numpy as np
 from chamberopt.chamber.checks.fillets import AS_DRAWN, OF_FILLET, OF_SLOT, inner_edges, too_narrow
 from chamberopt.chamber.checks.jams import JAM_BAND, MAX_COSINE, MIN_AREA
 from chamberopt.chamber.checks.usual import DEEPEST
-from chamberopt.chamber.largest_ball import largest_balls, spread_points
+from chamberopt.chamber.largest_ball import spread_points
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
 from chamberopt.geometry.thickness import depth_below
@@ -103,7 +103,7 @@ def fit_sizes(part: Part, diameters: Sequence[float]) -> list[SizeFit]:
 
     Inner edges without a fillet are left out, because no ball fits there.
     """
-    from sim_core import TriangleMesh
+    from sim_core import TriangleMesh, largest_balls
 
     mesh = TriangleMesh(part.vertices, part.triangles, np.zeros(len(part.triangles), np.uint8))
     size = areas(part.vertices, part.triangles)

@@ -12,14 +12,13 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.gaps import gap_warnings, pocket_warnings, surface_warnings
 from chamberopt.chamber.checks.place_names import PART, PART_SIDE
 from chamberopt.chamber.checks.warning import WarningKind
-from chamberopt.chamber.largest_ball import largest_balls
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.reach import TOLERATED_OVERLAP, Reach, find_reach, reached_part_share
 from chamberopt.chamber.scene import build_scene, chamber_mesh
 from chamberopt.design.load import load_design
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import area_vectors, areas
-from sim_core import simulate
+from sim_core import largest_balls, simulate
 
 DESIGNS = Path(__file__).resolve().parents[3] / "designs"
 BALL = 3e-3
