@@ -2,7 +2,8 @@
 
 After `write_json_lines` each step writes lines of JSON, for a program to read: {"step": name,
 "done": 3, "total": 20, "best": 0.81}, and at its end {"step": name, "ended": true}. What a command
-knows before its end is a line too, such as {"draft": {...}} of a proposal.
+knows before its end is a line too, such as {"draft": {...}} of a proposal, or {"held": {"balls": 2,
+"place": "(1.0, 2.0, 3.0) mm"}} of balls that are held in gaps.
 """
 
 from __future__ import annotations

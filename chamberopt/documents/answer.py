@@ -135,7 +135,8 @@ def answer_lines(result: Result, start: Result | None = None) -> list[AnswerLine
     much less hard a study's best chamber peens than the start, what each step does, which limits of
     zones and constraints are met, and name doubts about the calibration.
     """
-    lines = [*time_lines(result), *shot_lines(result), *range_answer(result)]
+    of_time = time_lines(result) or [*_unresolved_lines(result)]
+    lines = [*of_time, *shot_lines(result), *range_answer(result)]
     lines += intensity_lines(result.design, result.metrics)
     lines += [
         *_ended_lines(result),
@@ -149,6 +150,15 @@ def answer_lines(result: Result, start: Result | None = None) -> list[AnswerLine
     return lines + [
         AnswerLine("calibration", f"{one[0].upper()}{one[1:]}.", True) for one in doubts if one
     ]
+
+
+def _unresolved_lines(result: Result) -> Iterator[AnswerLine]:
+    """Yield a warning where so few dents were simulated that the time cannot be judged."""
+    time = result.metrics.get("time_to_98_s")
+    if time is not None and time.in_words == NOT_RESOLVED:
+        planned = plain(result.design.process.treatment_time)
+        text = f"So few dents do not tell whether {planned} s are enough: simulate longer."
+        yield AnswerLine("process", text, True)
 
 
 def shot_lines(result: Result) -> Iterator[AnswerLine]:

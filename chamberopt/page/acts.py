@@ -42,6 +42,7 @@ from chamberopt.documents.wanted import times_longer
 from chamberopt.documents.wording import metric_label, named_value
 from chamberopt.geometry.faces import Border
 from chamberopt.page.answers import (
+    face_names,
     packed,
     part_answer,
     picked_answer,
@@ -50,7 +51,7 @@ from chamberopt.page.answers import (
     surface_answer,
 )
 from chamberopt.page.checker import Checker
-from chamberopt.page.duration import duration_in_words
+from chamberopt.page.duration import duration_in_words, tried_duration
 from chamberopt.page.edited_file import OF_MATTERS, EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
 from chamberopt.page.page_words import (
@@ -176,7 +177,7 @@ def _stale(before: Mapping[str, object]) -> str:
 def shown(folders: Sequence[Path]) -> dict[str, object]:
     """Return the 3D view of results side by side, with the answer of one or the comparison of two.
 
-    What is answered stands above the view, and its figures below.
+    What is answered stands beside the view, and its figures below.
 
     Where one does not tell the peening strength, `longer` has how many times as long a simulation
     tells it, and this time as values of the design.
@@ -211,7 +212,8 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
     figures = [one for one in first.content if one not in answers]
     below = [*([Section("In figures", figures)] if figures else []), *below]
     above = section(replace(first, content=answers), viewer)
-    html = explained(above + html + "".join(section(one, viewer) for one in below))
+    more = "".join(section(one, viewer) for one in below)
+    html = explained(f'<div class="told">{above}</div><div class="map">{html}</div>{more}')
     places = len(folders) > 1 and is_alike  # whether these can be compared
     return {"content": content, "html": html, "longer": longer, "places": places}
 
@@ -317,6 +319,11 @@ class Acts:
         """Return the number of the face to which each triangle of the part belongs."""
         mesh = preview_part(self._file(asked).design).mesh
         return packed({}, face=self._picker.faces(mesh, _border(asked)).of_triangle)
+
+    def names(self, asked: Any) -> dict[str, object]:
+        """Return the names of the faces of `faces` that have one, by the number of each."""
+        mesh = preview_part(self._file(asked).design).mesh
+        return {"names": face_names(mesh, self._picker.faces(mesh, _border(asked)).of_triangle)}
 
     def pick(self, asked: Any) -> dict[str, object]:
         design = self._file(asked).with_changes(asked["changes"])
@@ -438,6 +445,12 @@ class Acts:
         folders = _result_folders(self._path.parent)
         words = duration_in_words(what, folders)
         return {"words": words, "searched": self._searched(what, folders)}
+
+    def tried(self, asked: Any) -> dict[str, str]:
+        """Return in words how long a design will take, by a moment of it; "" if that fails."""
+        what = self.inside(str(asked["of"]))
+        self._refuse_shape(what)
+        return {"words": tried_duration(what)}
 
     def _searched(self, file: Path, folders: Sequence[Path]) -> str:
         """Return the first of some folders in which a study was searched; "" for a design."""

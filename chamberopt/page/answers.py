@@ -91,6 +91,19 @@ def picked_answer(mesh: PartMesh, picked: Sequence[Picked]) -> bytes:
     return packed({"rows": rows}, **found)
 
 
+def face_names(mesh: PartMesh, face: np.ndarray) -> dict[int, str]:
+    """Return the names that the proposal gives to faces, by the number of each.
+
+    Args:
+        face: number of the face of each triangle, (m,).
+    """
+    names: dict[int, str] = {}
+    for one in _surfaces(mesh):
+        within = np.bincount(face, ~one.triangles) == 0
+        names |= {int(k): one.name for k in np.flatnonzero(within)}
+    return names
+
+
 @lru_cache(maxsize=2)
 def _surfaces(mesh: PartMesh) -> list[Surface]:
     return surfaces(mesh)
@@ -137,6 +150,8 @@ def shape_answer(design: Design, step: int = 0) -> bytes:
         "shift": (1e3 * part.shift).tolist(),
         "shape_mm": [(1e3 * low).tolist(), (1e3 * high).tolist()],
         "part_mm": [(1e3 * own.min(axis=0)).tolist(), (1e3 * own.max(axis=0)).tolist()],
+        "shape": design.chamber.shape,
+        "distance_mm": getattr(design.chamber, "sonotrode_distance_mm", None),
         "way": _way(part.mesh, part.rotation.tobytes(), part.target.tobytes()),
         "target_triangles": int(part.target.sum()),
         "balls": design.shot.count,

@@ -134,8 +134,9 @@ OF_FRONT = "example", "look", "view", "face", "chamber", "propose", "open", "clo
 LOOKS_OF_FRONT = "front", "status"
 OF_DESIGN = (
     "read", "part", "surface", "fields", "structure", "step", "remove", "shape", "cavity", "reach",
-    "faces", "pick", "picked", "save", "study", "start", "make", "made", "shown", "candidates",
-    "candidate", "model", "resume", "more", "duration", "results", "difference",
+    "faces", "names", "pick", "picked", "save", "study", "start", "make", "made", "shown",
+    "candidates", "candidate", "model", "resume", "more", "duration", "tried", "results",
+    "difference",
 )  # fmt: skip
 CLOSED = "no design is open here any more: reload the page"
 NONSENSE = (

@@ -37,6 +37,7 @@ class StartedCommand:
         self._steps: dict[str, dict[str, Any]] = {}
         self._stage: dict[str, int] | None = None  # number of the present one, and their count
         self._draft: dict[str, Any] | None = None  # a proposal before its pilots
+        self._held: dict[str, Any] = {}  # balls that are held in gaps as it simulates
         self._began = time.monotonic()
         self._process = start_python(
             COMMAND,
@@ -68,7 +69,8 @@ class StartedCommand:
         page, as its warnings are; `fault` are those where it failed, and `at` has what the last of
         them says of an option. `answer` is what a command that was asked for JSON has answered, or
         None. `draft` is a proposal before its pilots, while the command runs, and `stage` the
-        number of its present stage and the count of all.
+        number of its present stage and the count of all. `held` tells of balls that are held in
+        gaps in a replica that runs now, if any: their count and a place.
         """
         code = self._process.poll()
         if code is not None:
@@ -91,6 +93,7 @@ class StartedCommand:
             "exit": code,
             "stage": self._stage,
             "draft": self._draft if code is None else None,
+            "held": self._held if code is None and self._held.get("balls") else None,
             "answer": json.loads("".join(self._answer)) if self._answer and code == 0 else None,
         }
 
@@ -126,6 +129,8 @@ class StartedCommand:
                 self._draft = told["draft"]
             elif "stage" in told:
                 self._stage = told["stage"]
+            elif "held" in told:
+                self._held = told["held"]
             elif told.get("ended"):
                 self._steps.pop(told["step"], None)
             else:
@@ -134,7 +139,7 @@ class StartedCommand:
 
 def _told(line: str) -> dict[str, Any] | None:
     """Return what a command prints for a program as a line of JSON, or None for other lines."""
-    if not line.startswith(('{"step"', '{"draft"', '{"stage"')):
+    if not line.startswith(('{"step"', '{"draft"', '{"stage"', '{"held"')):
         return None
     try:
         return dict(json.loads(line))

@@ -15,7 +15,7 @@ from chamberopt.chamber.checks.fillets import facet_warnings
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import share
-from chamberopt.common.progress import Progress
+from chamberopt.common.progress import Progress, tell_program
 from chamberopt.coverage.dents import dent_diameter
 from chamberopt.coverage.field.surface_points import StepRoom
 from chamberopt.coverage.field.target_field import (
@@ -226,6 +226,7 @@ class _Run:
             if progress:
                 done = max(len(replicas), self.before + self.underway.done)
                 progress(done, max(count, self.effort.most), None)
+                tell_program("held", self.underway.held)
 
         for replica in run_in_order(self.underway.task, self.setting, *how, tell):
             replicas.append(replica)

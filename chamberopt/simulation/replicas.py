@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 import numpy as np
 
 from chamberopt.chamber.analytic import impacts_on_chamber
+from chamberopt.chamber.checks.place_names import around
 from chamberopt.chamber.flexure import flexure_of_surfaces
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.replica_seed import replica_seed, step_seed
@@ -81,15 +82,25 @@ class Underway:
     def __init__(self, setting: ReplicaSetting, shared: ReplicaSetting) -> None:
         self._is_here, self._steps = shared is setting, max(len(setting.chamber.steps), 1)
         self._shares: dict[int, float] = {}  # of the time of a replica or of a step, by its seed
+        self._held: dict[int, np.ndarray] = {}  # places of balls that are held then, by the same
 
     @property
     def task(self) -> Callable[[ReplicaSetting, int], Replica]:
         """What simulates a replica, and tells here how far it has come."""
         return partial(simulate_replica, told=self.tell) if self._is_here else simulate_replica
 
-    def tell(self, seed: int, part: float) -> None:
-        """Take note of the part of its time that a replica, or a step of one, has behind it."""
-        self._shares[seed] = part
+    def tell(self, seed: int, part: float, held: np.ndarray) -> None:
+        """Take note of the part of its time that a replica, or a step of one, has behind it.
+
+        Args:
+            held: places of the balls that are held in gaps now [m], (k, 3).
+        """
+        self._shares[seed], self._held[seed] = part, held if part < 1.0 else held[:0]
+
+    def held(self) -> dict[str, object]:
+        """Return how many balls are held in gaps in the replica with most, and the place of one."""
+        places = max([*self._held.values()], key=len, default=np.empty((0, 3)))
+        return {"balls": len(places), "place": around(places[:1]) if len(places) else ""}
 
     @property
     def done(self) -> float:
@@ -171,15 +182,15 @@ def _result(number: int, future: Future[T], tell: Callable[[], None] | None) -> 
 
 
 def simulate_replica(
-    setting: ReplicaSetting, seed: int, told: Callable[[int, float], None] | None = None
+    setting: ReplicaSetting, seed: int, told: Callable[[int, float, np.ndarray], None] | None = None
 ) -> Replica:
     """Simulate one replica with this seed, and return its balls and its impacts on the part.
 
     With steps, each step is simulated from a start of its own, for its share of the time.
 
     Args:
-        told: called as told(seed, part of the time that is simulated), now and then; with steps by
-            the seed of each.
+        told: called as told(seed, part of the time that is simulated, places of balls held in gaps
+            then [m]), now and then; with steps by the seed of each.
     """
     design, chamber, _ = setting
     if not chamber.steps:
@@ -244,7 +255,7 @@ def simulate_seed(
     chamber: Chamber,
     mesh: TriangleMesh | AnalyticCavity,
     seed: int,
-    told: Callable[[int, float], None] | None = None,
+    told: Callable[[int, float, np.ndarray], None] | None = None,
 ) -> SimulationResult:
     """Run the simulator once with this seed, and return its result.
 
@@ -258,11 +269,17 @@ def simulate_seed(
     axis, flexure = turning_axis(design, chamber.part), flexure_of_surfaces(design, chamber, mesh)
     scene = build_scene(design, mesh, seed, axis, flexure)
 
+    places = np.empty((0, 3))
+
+    def hold(now: np.ndarray) -> None:
+        nonlocal places
+        places = now
+
     def tell(seconds: float) -> None:
         if told:
-            told(seed, seconds / (scene.warmup + scene.duration))
+            told(seed, seconds / (scene.warmup + scene.duration), places)
 
-    result = simulate(scene, progress=tell)
+    result = simulate(scene, progress=tell, held=hold)
     if isinstance(mesh, TriangleMesh):
         return result
     return replace(result, impacts=impacts_on_chamber(result.impacts, chamber))

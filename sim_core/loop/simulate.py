@@ -42,7 +42,7 @@ from sim_core.loop.impact_log import (
 from sim_core.loop.jam_message import jam_message
 from sim_core.loop.neighbours import MAX_SPEED, NeighbourFilter, new_neighbour_filter
 from sim_core.loop.state import Clock, SimulationState
-from sim_core.loop.stays import Trapped, begin_anew, is_on_one_side, new_stays, trapped
+from sim_core.loop.stays import Trapped, begin_anew, held_now, is_on_one_side, new_stays, trapped
 from sim_core.motion import WINDOW
 from sim_core.numerics.computed_once import computed_once
 from sim_core.numerics.periodic_sides import new_periodic_sides
@@ -107,6 +107,7 @@ def simulate(
     scene: Scene,
     frames: Sequence[float] | np.ndarray = (),
     progress: Callable[[float], None] = lambda seconds: None,
+    held: Callable[[np.ndarray], None] = lambda places: None,
 ) -> SimulationResult:
     """Simulate the scene from its start to the end of its duration.
 
@@ -118,12 +119,14 @@ def simulate(
             noted, each on its flight at that very time. Noting changes no bit of the other results.
         progress: called at least every TELL_EVERY simulated seconds with the time since the start,
             including the warm-up [s].
+        held: called before each call of `progress` with the places of the balls that are held in
+            gaps then [m], (k, 3).
 
     Raises:
         SimulationError: if a ball is lost, jams, or stops being a number.
     """
     times = _checked_frames(frames, scene)
-    run = Simulation(scene, progress)
+    run = Simulation(scene, progress, held)
     run.play(scene.warmup, record=False)
     begin_anew(run.state.stays, scene.warmup)
     end = scene.warmup + scene.duration
@@ -165,9 +168,12 @@ class Simulation:
     """A scene being simulated: the state that the event loop works on, and the logs so far."""
 
     def __init__(
-        self, scene: Scene, progress: Callable[[float], None] = lambda seconds: None
+        self,
+        scene: Scene,
+        progress: Callable[[float], None] = lambda seconds: None,
+        held: Callable[[np.ndarray], None] = lambda places: None,
     ) -> None:
-        self.scene, self.progress = scene, progress
+        self.scene, self.progress, self.held = scene, progress, held
         self.centre = scene.mesh.middle
         self.logs: list[ImpactLog] = []
         self.meetings: list[CollisionLog] = []
@@ -306,6 +312,7 @@ class Simulation:
             if stop in checks:
                 self._require_sound()
             if stop in tells:
+                self.held(held_now(self.state.stays, self.centre))
                 self.progress(self.time)
         self._empty_buffers()
         return noted

@@ -304,6 +304,15 @@ def begin_anew(stays: Stays, now: float) -> None:
     stays.rattled[:] = np.where(stays.rattled > 0.0, now, 0.0)
 
 
+def held_now(stays: Stays, middle: np.ndarray) -> np.ndarray:
+    """Return the places of the balls that are held in gaps [m], (k, 3).
+
+    Args:
+        middle: middle of the mesh [m], (3,).
+    """
+    return np.asarray(stays.spot[stays.rattled > 0.0] + middle)
+
+
 def trapped(stays: Stays, middle: np.ndarray) -> Trapped:
     """End all series, and return the balls that were hopping or rattling since recording began.
 

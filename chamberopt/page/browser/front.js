@@ -1,7 +1,7 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
 import { asLines, ask, attempt, element, onPage, unpack, warning } from "./state.js";
 import { followed, sinceBegin, stage } from "./steps.js";
-import { BODIES, colourByState, drawBodies, lights } from "./surfaces.js";
+import { BODIES, colourByState, DIMENSIONS, drawBodies, drawDimensions, lights } from "./surfaces.js";
 
 const find = (id) => document.getElementById(id);
 const option = (one) => element("option", { value: [one].flat()[0], textContent: [one].flat().at(-1) }); // a text, or a pair with its words
@@ -41,7 +41,7 @@ async function open(design) {
 
 const view = new View3D(find("view")), tools = new Tools([view], find("tools"));
 let drawnPart = "", pointed = "", seen = null;
-const CHAMBER = ["walls", "sonotrode", "edges", "remeshed", ...BODIES];
+const CHAMBER = ["walls", "sonotrode", "edges", "remeshed", ...BODIES, ...DIMENSIONS];
 
 // Draw the part beside its size, where the names of its surfaces are pointed at.
 async function draw(part) {
@@ -52,6 +52,7 @@ async function draw(part) {
   view.highlight("part", null);
   for (const name of ["part", ...CHAMBER]) view.remove(name);
   tools.renew();
+  tools.close();
   drawnPart = drawn;
   if (!part) return;
   const told = unpack(await ask("/view", { part, unit: known.unit }));
@@ -84,9 +85,11 @@ async function drawChamber(isDraft) {
   for (const name of CHAMBER) view.remove(name); // of the proposal before
   view.show(["part"], true);
   drawBodies(view, answer, seen.edges);
+  drawDimensions(view, answer);
   const [low, high] = answer.shape_mm;
   const box = { low: low.map((x, i) => Math.min(x, answer.part_mm[0][i])), high: high.map((x, i) => Math.max(x, answer.part_mm[1][i])) };
   lookAt(box, answer.way);
+  tools.open();
   document.body.dataset.chamber = isDraft ? "draft" : "proposal";
   await drawCavity(isDraft);
 }

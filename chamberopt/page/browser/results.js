@@ -108,7 +108,7 @@ function simulateLonger({ times, values }) {
 // Where the second result covers more or less than the first, as the command compare draws it.
 async function showDifference(folders) {
   const place = element("section", { id: "difference" }, element("h2", { textContent: "Difference of coverage" }), "drawing where they differ …");
-  find("shown").querySelector("section").after(place);
+  find("shown").querySelector(".map").after(place);
   const { picture, why } = await ask("/difference", { folders }).catch(({ message }) => ({ why: message }));
   place.lastChild.replaceWith(picture ? element("img", { src: picture, alt: "the part with the difference of coverage at each place" }) : why);
 }

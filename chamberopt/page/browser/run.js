@@ -71,11 +71,24 @@ async function tellDuration() {
   find("lasts").className = refused ? "wrong" : "soft";
   find("lasts").replaceChildren(...(refused ? [...onPage(refused), element("p", { hidden: !chosen()?.asks, textContent: "The search below asks the same between values that hold those of the design." })]
     : [known.words ? `It will take ${known.words}.` : ""]));
+  if (known && !known.words && !isRunning && !find("run").hidden) await tryDuration(of);
   searched = known?.searched ?? "";
   find("searched").textContent = searched;
   allow();
 }
-document.querySelector("[data-tab=run]").addEventListener("click", tellDuration);
+document.querySelector("[data-tab=run]").addEventListener("click", () => setTimeout(tellDuration)); // once the tab is shown
+
+// Of a design without results a moment is simulated, once for each version of its file.
+const tried = new Map();
+async function tryDuration(of) {
+  if (chosen()?.kind !== "design") return;
+  const key = `${of} ${state.file.read}`, tell = (words) => { if (find("of").value === of && !isRunning) find("lasts").textContent = words; };
+  if (!tried.has(key)) {
+    tell("finding out how long it takes …");
+    tried.set(key, await ask("/tried", { of }).then(({ words }) => words, () => ""));
+  }
+  tell(tried.get(key) ? `It will take ${tried.get(key)}, by a moment of it.` : "");
+}
 
 // Limits of figures: name, label with unit, side and value of each.
 let limits = [];
@@ -141,7 +154,7 @@ const KEEPS = { simulate: ["ends it with a result of the replicas that have ende
 const CALIBRATED = "loses it: the intervals of a design with a calibration take all replicas.";
 const keeps = (command) => command.startsWith("chamberopt simulate ") && state.file.is_calibrated ? [CALIBRATED, KEEPS.simulate[1]] : KEEPS[command.split(" ")[1]] ?? ["", "stopped"];
 
-function show({ command, result, kept, steps, seconds, printed, exit }) {
+function show({ command, result, kept, steps, held, seconds, printed, exit }) {
   if (exit !== null && command.startsWith("chamberopt new ")) return; // of the front page
   const before = study;
   study = exit === null && isStudy(command) ? result : "";
@@ -152,12 +165,15 @@ function show({ command, result, kept, steps, seconds, printed, exit }) {
   isRunning = exit === null;
   allow();
   const now = exit === null ? sinceBegin(seconds) : exit === 0 ? "finished" : exit === 130 ? kept ? "stopped; what was simulated until then is a result" : keeps(command)[1] : `ended with exit status ${exit}`;
-  find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...toResult(command, result, exit, kept));
+  find("progress").replaceChildren(element("p", { title: command }, element("b", { textContent: now })), ...bars(steps), ...slowed(held), ...toResult(command, result, exit, kept));
   find("study-progress").replaceChildren(...(study ? [...find("progress").children].map((one) => one.cloneNode(true)) : [])); // which is in its place
   find("printed").replaceChildren(...asLines(printed));
   find("printed-fold").hidden = !printed.length;
   if (exit) find("printed-fold").open = true;
 }
+
+// Balls in a gap hit its sides so often that a run takes many times longer.
+const slowed = (held) => held ? [element("p", { className: "warning", textContent: `${held.balls} ${held.balls > 1 ? "balls are" : "ball is"} held in a gap, one at ${held.place} in the chamber: this makes the run longer. Other balls, or a narrower or wider gap, mend it.` })] : [];
 
 // A page that was loaded anew meanwhile has not shown what the command has found.
 function toResult(command, result, exit, kept) {

@@ -1,6 +1,6 @@
 // The view: part and chamber as the newest answers have them, and handles that turn and move the part.
 import { change, endMove, state, unpack, value } from "./state.js";
-import { BODIES, colourByState, drawBodies } from "./surfaces.js";
+import { BODIES, colourByState, drawBodies, drawDimensions, short } from "./surfaces.js";
 
 export const view = new View3D(document.getElementById("view"));
 const tools = new Tools([view], document.getElementById("tools"));
@@ -26,9 +26,9 @@ export function showShape(answer) {
   walls(answer);
   const first = !placed;
   placed = answer;
-  if (first) lookAtAll();
+  if (first) { lookAtAll(); tools.open(); }
   else if (state.showing && isBeyond(answer.shape_mm)) lookAtAll(view.camera.position.clone().sub(view.orbit.target).normalize().toArray());
-  dimensions();
+  drawDimensions(view, placed);
   if (grip && !handles.dragging) grip.position.set(...middle());
 }
 
@@ -67,7 +67,6 @@ export function lookAnew() { placed = null; }
 
 const mid = (a, b) => a.map((x, i) => 0.5 * (x + b[i]));
 const middle = () => mid(...placed.part_mm);
-const short = (x) => String(Number(x.toPrecision(4)));
 
 let fitted = null; // lowest and highest corner of what was last looked at as a whole
 const isBeyond = ([low, high]) => low.some((x, i) => x < fitted[0][i] - 0.1) || high.some((x, i) => x > fitted[1][i] + 0.1);
@@ -83,51 +82,25 @@ function lookAtAll(way = placed.way) {
 
 view.renderer.domElement.addEventListener("dblclick", () => { if (placed) lookAtAll(); });
 
-// Sizes of the chamber and the part's height over the sonotrode, and the part's box.
-function dimensions() {
-  const [low, high] = placed.shape_mm, [a, b] = placed.part_mm, size = Math.hypot(...high.map((x, i) => x - low[i]));
-  const gap = 0.06 * size, upright = [0, 0, 1];
-  const ends = [];
-  for (const [i, j] of [[0, 1], [1, 3], [3, 2], [2, 0], [4, 5], [5, 7], [7, 6], [6, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
-    for (const k of [i, j]) ends.push([k & 1 ? b[0] : a[0], k & 2 ? b[1] : a[1], k & 4 ? b[2] : a[2]]);
-  const show = (name, along, lines, texts) => {
-    view.lines(`${name}, lines`, Float32Array.from(lines.flat()), "#56616a", along ? "wall" : "", along);
-    view.texts(name, texts, along ? "wall" : "", along);
-  };
-  show("box", null, ends, [["part " + b.map((x, i) => short(x - a[i])).join(" × ") + " mm", [0.5 * (a[0] + b[0]), a[1], b[2] + 0.03 * size]]]);
-  const across = high[1] - low[1], isRound = value("chamber.shape") !== "box" && Math.abs(high[0] - low[0] - across) < 1e-3 * size;
-  const sign = value("chamber.shape") === "cylinder" ? "⌀ " : "";
-  show("width", [1, 0, 0], dimension([low[0], low[1], 0], [high[0], low[1], 0], [0, -gap, 0], size),
-    [[`${sign}${short(high[0] - low[0])} mm`, [0.5 * (low[0] + high[0]), low[1] - gap, -0.4 * gap]]]);
-  show("depth", [0, 1, 0], isRound ? [] : dimension([low[0], low[1], 0], [low[0], high[1], 0], [-gap, 0, 0], size),
-    isRound ? [] : [[`${short(across)} mm`, [low[0] - gap, 0.5 * (low[1] + high[1]), -0.4 * gap]]]);
-  // What of the part is outside of the walls may be lower: then the distance is at an edge of the chamber.
-  const set = Number(value("chamber.sonotrode_distance_mm") ?? a[2]), isOwn = Math.abs(set - a[2]) < 0.05;
-  const [x, y] = isOwn ? [b[0], a[1]] : [low[0], low[1]];
-  show("height", upright, [...dimension([high[0], high[1], 0], [high[0], high[1], high[2]], [gap, 0, 0], size),
-    ...dimension([x, y, 0], [x, y, set], [0, 0, 0], size)],
-  [[`height ${short(high[2])} mm`, [high[0] + gap, high[1], 0.8 * high[2]]], [`distance ${short(set)} mm`, [x, y, 0.5 * set]]]);
-}
-
-// Ends of the lines of a dimension between two places: arrows, aside by a way, and a line from each place to its arrow.
-function dimension(from, to, aside, size) {
-  const add = (place, way, by = 1) => place.map((x, i) => x + by * way[i]), far = Math.hypot(...aside);
-  const along = to.map((x, i) => x - from[i]), length = Math.hypot(...along), head = Math.min(0.02 * size, 0.3 * length);
-  const across = far ? aside.map((x) => x / far) : [1, 0, 0], [start, end] = [add(from, aside), add(to, aside)];
-  const lines = [start, end];
-  for (const [tip, sign] of [[start, 1], [end, -1]]) {
-    const back = add(tip, along, sign * head / Math.max(length, 1e-9));
-    for (const side of [-0.3, 0.3]) lines.push(tip, add(back, across, side * head));
-  }
-  if (far) lines.push(from, add(start, aside, 0.2), to, add(end, aside, 0.2));
-  return lines;
-}
-
 // Number of the part's triangle below the pointer, or null.
 export function triangleAt(event) { return view.at(event, ["part"])?.triangle ?? null; }
 
+// Area [mm²] of triangles of the part, and whether they are flat or how far round they go: what a face is, in words.
+export function faceInWords(triangles, triangle, place) {
+  const mesh = view.get("part"), { normals } = Round.facets(mesh), first = normals[triangle], { index } = mesh.userData;
+  let area = 0;
+  for (const k of triangles) {
+    const [a, b, c] = [0, 1, 2].map((i) => Round.corner(mesh, index[3 * k + i]));
+    area += b.sub(a).cross(c.sub(a)).length() / 2;
+  }
+  const isFlat = triangles.every((k) => normals[k].dot(first) > Measure.PARALLEL), round = isFlat ? null : Round.of(mesh, triangle, place);
+  return `${isFlat ? "flat" : round ? `round, ${Measure.across(round)}` : "curved"}, ${short(area)} mm²`;
+}
+
 const CHOSEN = { holder: "clamped by the holder", mask: "covered by the mask" };
-// What is said of the place under the pointer: how the part's file names its surface, what it is, and where.
+let toldOfFace = null; // gives words on the face that is met, and on what a click does with it
+export function tellOfFace(tell) { toldOfFace = tell; }
+// What is said of the place under the pointer: how the part's file names its surface, what face it is, whether it is in the target, and where.
 const under = document.getElementById("under");
 view.renderer.domElement.addEventListener("pointermove", (event) => {
   const hit = event.buttons || !placed ? null : view.at(event, ["part"]);
@@ -135,7 +108,9 @@ view.renderer.domElement.addEventListener("pointermove", (event) => {
   if (!hit) return;
   const name = part.groups[part.surface?.[hit.triangle]], [kind] = part.kinds[part.states[placed.state[hit.triangle]]];
   const zone = placed.zones[placed.zone[hit.triangle] - 1], words = CHOSEN[part.states[placed.state[hit.triangle]]] ?? kind;
-  under.textContent = [name, words === "zone" ? `zone ${zone}` : words, `at ${Measure.at(hit.place)}`].filter(Boolean).join(", ");
+  const [face, remedy] = toldOfFace?.(hit, part.states[placed.state[hit.triangle]]) ?? [];
+  const said = [face?.startsWith(`${name},`) ? "" : name, face, words === "zone" ? `zone ${zone}` : words, `at ${Measure.at(hit.place)}`].filter(Boolean).join(", ");
+  under.textContent = [said, remedy].filter(Boolean).join(": ");
 });
 view.renderer.domElement.addEventListener("pointerleave", () => { under.hidden = true; });
 

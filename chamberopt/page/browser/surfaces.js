@@ -25,6 +25,51 @@ export function drawBodies(view, answer, edges, opacity = 1) {
   view.lines("edges", answer.edges.slice(), edges, "wall");
 }
 
+const ALONG = { box: null, width: [1, 0, 0], depth: [0, 1, 0], height: [0, 0, 1] }; // axis of each dimension; it is not drawn where the eye looks along it
+export const DIMENSIONS = Object.keys(ALONG).flatMap((name) => [name, `${name}, lines`]);
+export const short = (x) => String(Number(x.toPrecision(4)));
+
+// Sizes of the chamber and the part's height over the sonotrode, and the part's box.
+export function drawDimensions(view, { shape, shape_mm: [low, high], part_mm: [a, b], distance_mm }) {
+  const size = Math.hypot(...high.map((x, i) => x - low[i]));
+  const gap = 0.06 * size;
+  const ends = [];
+  for (const [i, j] of [[0, 1], [1, 3], [3, 2], [2, 0], [4, 5], [5, 7], [7, 6], [6, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
+    for (const k of [i, j]) ends.push([k & 1 ? b[0] : a[0], k & 2 ? b[1] : a[1], k & 4 ? b[2] : a[2]]);
+  const show = (name, lines, texts) => {
+    const along = ALONG[name];
+    view.lines(`${name}, lines`, Float32Array.from(lines.flat()), along ? "#56616a" : "#b4bcc2", along ? "wall" : "", along);
+    view.texts(name, texts, along ? "wall" : "", along);
+  };
+  show("box", ends, [["part " + b.map((x, i) => short(x - a[i])).join(" × ") + " mm", [0.5 * (a[0] + b[0]), a[1], b[2] + 0.03 * size]]]);
+  const across = high[1] - low[1], isRound = shape !== "box" && Math.abs(high[0] - low[0] - across) < 1e-3 * size;
+  const sign = shape === "cylinder" ? "⌀ " : "";
+  show("width", dimension([low[0], low[1], 0], [high[0], low[1], 0], [0, -gap, 0], size),
+    [[`${sign}${short(high[0] - low[0])} mm`, [0.5 * (low[0] + high[0]), low[1] - gap, -0.4 * gap]]]);
+  show("depth", isRound ? [] : dimension([low[0], low[1], 0], [low[0], high[1], 0], [-gap, 0, 0], size),
+    isRound ? [] : [[`${short(across)} mm`, [low[0] - gap, 0.5 * (low[1] + high[1]), -0.4 * gap]]]);
+  // What of the part is outside of the walls may be lower: then the distance is at an edge of the chamber.
+  const set = Number(distance_mm ?? a[2]), isOwn = Math.abs(set - a[2]) < 0.05;
+  const [x, y] = isOwn ? [b[0], a[1]] : [low[0], low[1]];
+  show("height", [...dimension([high[0], high[1], 0], [high[0], high[1], high[2]], [gap, 0, 0], size),
+    ...dimension([x, y, 0], [x, y, set], [0, 0, 0], size)],
+  [[`height ${short(high[2])} mm`, [high[0] + gap, high[1], 0.8 * high[2]]], [`distance ${short(set)} mm`, [x, y, 0.5 * set]]]);
+}
+
+// Ends of the lines of a dimension between two places: arrows, aside by a way, and a line from each place to its arrow.
+function dimension(from, to, aside, size) {
+  const add = (place, way, by = 1) => place.map((x, i) => x + by * way[i]), far = Math.hypot(...aside);
+  const along = to.map((x, i) => x - from[i]), length = Math.hypot(...along), head = Math.min(0.02 * size, 0.3 * length);
+  const across = far ? aside.map((x) => x / far) : [1, 0, 0], [start, end] = [add(from, aside), add(to, aside)];
+  const lines = [start, end];
+  for (const [tip, sign] of [[start, 1], [end, -1]]) {
+    const back = add(tip, along, sign * head / Math.max(length, 1e-9));
+    for (const side of [-0.3, 0.3]) lines.push(tip, add(back, across, side * head));
+  }
+  if (far) lines.push(from, add(start, aside, 0.2), to, add(end, aside, 0.2));
+  return lines;
+}
+
 // `answer` gives the triangles of the surface that `named` names, or what the server answers of them.
 export function lights(named, view, answer, colour) {
   let isOn = false, found = null;

@@ -1,6 +1,6 @@
 // Choosing the target and zones by clicking faces, or by names of the file, and turning a face down.
 import { ask, attempt, change, element, say, state, unpack } from "./state.js";
-import { seeThrough, setHandles, triangleAt, view } from "./scene.js";
+import { faceInWords, seeThrough, setHandles, tellOfFace, triangleAt, view } from "./scene.js";
 import { lights } from "./surfaces.js";
 
 const find = (id) => document.getElementById(id);
@@ -108,14 +108,15 @@ find("crease").addEventListener("input", () => {
   find("crease-fault").textContent = isRight ? "" : `given ${value || "no number"}; allowed: from ${min} to ${max}°`;
 });
 
-// Number of the face of each triangle that a click takes; null until the server has found faces up to these creases.
+// Number of the face of each triangle that a click takes; null until the server has found faces up to these creases. Their names follow.
 let creased = {};
 function faces() {
   const { part } = fillTarget, crease_deg = Number(find("crease").value);
-  if (byCadFaces()) return part.cad_face;
-  if (creased.part !== part || creased.crease_deg !== crease_deg) {
-    const asked = creased = { part, crease_deg, of: null };
-    ask("/faces", { crease_deg }).then((answer) => { asked.of = unpack(answer).face; }, () => {}); // a click tells what is wrong
+  const ends = byCadFaces() ? null : crease_deg;
+  if (creased.part !== part || creased.ends !== ends) {
+    const asked = creased = { part, ends, of: ends === null ? part.cad_face : null };
+    const found = ends === null ? Promise.resolve() : ask("/faces", { crease_deg }).then((answer) => { asked.of = unpack(answer).face; });
+    found.then(() => ask("/names", { crease_deg: ends })).then(({ names }) => { asked.names = names; }, () => {}); // a click tells what is wrong
   }
   return creased.of;
 }
@@ -133,6 +134,24 @@ function light(event) {
 }
 view.renderer.domElement.addEventListener("pointermove", light);
 view.renderer.domElement.addEventListener("pointerleave", () => light(null));
+// What the face under the pointer is, as a name and words, and what a click does with it. The face that was told of last is kept.
+let told = { of: null };
+tellOfFace(({ triangle, place }, kind) => {
+  const of = faces();
+  if (of && (told.of !== of || told.face !== of[triangle])) {
+    const own = [];
+    of.forEach((one, k) => { if (one === of[triangle]) own.push(k); });
+    told = { of, face: of[triangle], words: faceInWords(own, triangle, place) };
+  }
+  return [of ? [creased.names?.[told.face], told.words].filter(Boolean).join(", ") : "", whatAClickDoes(["target", "unreached", "outside"].includes(kind))];
+});
+function whatAClickDoes(isTarget) {
+  if (isFaceDown()) return "a click turns it down";
+  if (find("target").hidden) return `in the tab Target a click ${isTarget ? "takes it away" : "adds it"}`;
+  const where = find("surface").selectedOptions[0].textContent, takes = document.querySelector("input[name=act]:checked").value === "take";
+  if (takes) return `a click takes it away from ${where}`;
+  return isTarget && find("surface").value === "part.target" ? "choose “takes it away” to click it out" : `a click adds it to ${where}`;
+}
 const isFaceDown = () => find("down").getAttribute("aria-pressed") === "true";
 
 let clicks = Promise.resolve(); // one after the other, each on what the one before has made

@@ -6,12 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chamberopt.chamber.layout.target import surfaces
 from chamberopt.chamber.part import preview_part
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
+from chamberopt.geometry.faces import Faces
 from chamberopt.geometry.triangles import unit_normals
 from chamberopt.page.answers import (
     check_answers,
+    face_names,
     packed,
     part_answer,
     shape_answer,
@@ -32,6 +35,16 @@ def test_each_triangle_has_the_number_of_its_name(tmp_path: Path) -> None:
     marks = preview_part(design).mesh.groups
     for name in ("Top", "bottom", "left", "right", "ends"):
         assert (np.array(head["groups"])[numbers[marks[name]]] == name).all()
+
+
+def test_faces_have_the_names_of_surfaces_that_hold_them(tmp_path: Path) -> None:
+    """Sides of which the proposal makes one surface share its name."""
+    mesh = preview_part(design_of(tmp_path, {})).mesh
+    faces = Faces(mesh.vertices, mesh.triangles, 30.0)
+    names = face_names(mesh, faces.of_triangle)
+    assert sorted(names) == [*range(6)]
+    for one in surfaces(mesh):
+        assert {names[k] for k in np.unique(faces.of_triangle[one.triangles])} == {one.name}
 
 
 def test_the_triangles_of_a_surface_are_those_of_its_name(tmp_path: Path) -> None:

@@ -171,9 +171,25 @@ def test_a_young_run_tells_the_time_that_is_left(opened: Page) -> None:
     ]
 
 
+def test_a_chamber_is_first_seen_open_round_its_whole_part(opened: Page) -> None:
+    """Walls and sonotrode are cut through the chamber's middle, and the part is not."""
+    opened.wait("data-checked=reach")
+    cut = """async () => {
+      const { view } = await import("/browser/scene.js"), { section } = view;
+      const clipped = (name) => Boolean(view.get(name).material.clippingPlanes);
+      return [["walls", "sonotrode", "part"].map(clipped), section.kinds(), section.plane.constant];
+    }"""
+    clipped, kinds, away = opened.page.evaluate(cut)
+    assert clipped == [True, True, False]
+    assert sorted(kinds) == ["sonotrode", "wall"]
+    assert abs(away) < 0.01
+    expect(opened.page.locator(".tools label", has_text="cut the part")).to_be_visible()
+
+
 def test_a_section_is_filled_in_the_colours_of_the_legend(opened: Page) -> None:
     """The part is a cube of 16 mm in a cylinder of 40 mm, whose wall is 1.7 mm thick there."""
     page, legend = opened.page, opened.page.locator("#legend")
+    page.click(".tools >> text=Section")  # the chamber that is open round the whole part
     page.click(".tools >> text=Section")
     page.select_option(".tools select", "x")
     expect(page.locator(".tools input[type=number]")).to_have_value("0")
@@ -637,7 +653,8 @@ def test_a_click_picks_the_face_and_turns_it_down(opened: Page) -> None:
     row.get_by_role("button").click()
     expect(opened.page.locator("#message")).to_contain_text("nothing would be left")
     opened.page.mouse.move(*opened.page.evaluate(FIND, side)[1:])
-    expect(opened.page.locator("#under")).to_contain_text("target, at ")
+    expect(opened.page.locator("#under")).to_contain_text("flat, 256 mm², target, at ")
+    expect(opened.page.locator("#under")).to_contain_text("“takes it away” to click it out")
     opened.page.get_by_role("button", name="Section").dispatch_event("click")
     names = "#tools > .tools", "#steps", "#under", "#legend"
     boxes = [opened.page.locator(one).bounding_box() for one in names]
@@ -733,9 +750,11 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     assert page.locator("#shown #part-0 canvas").count() == 1
     answer, drawn, figures = (
         page.locator(one).bounding_box()["y"]
-        for one in ("#shown .answer", "#part-0", "#shown section:last-of-type")
+        for one in ("#shown .answer", "#part-0", "#shown > section:last-of-type")
     )
+    view = page.locator("#part-0").bounding_box()
     assert answer < drawn < figures
+    assert view["y"] + 0.7 * view["height"] < 800  # most of the map is on the first screen
     too_few = "Almen intensity: not known: too few dents were simulated"
     expect(page.locator("#shown .answer").first).to_contain_text(too_few)  # above the view
     longer = page.locator('[id="process.accuracy.simulated_time_s"]')

@@ -115,6 +115,15 @@ def test_a_ball_between_parallel_walls_is_held_from_its_tenth_hit_on() -> None:
     assert found.trapped.rattling[0] == pytest.approx((hits - 1) * clearance / speed)
 
 
+def test_a_held_ball_is_told_of_while_it_is_held() -> None:
+    """The last tells name the ball of the groove, where the result has it."""
+    told: list[np.ndarray] = []
+    result = simulate(groove(0), held=told.append)
+    assert len(told) >= 5
+    assert [len(one) for one in told[-3:]] == [1, 1, 1]
+    assert told[-1] == pytest.approx(result.trapped.position, abs=1e-9)
+
+
 def test_hits_of_a_held_ball_can_be_left_out_of_the_log_and_change_no_other_bit() -> None:
     scene = groove(0)
     whole, part = simulate(scene), simulate(replace(scene, record_held=False))

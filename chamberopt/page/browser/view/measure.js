@@ -81,19 +81,21 @@ class Measure {
   // The place that a click means, on a corner or edge if one is near: { place, normal: null at an edge, on: what it is on }; null for none.
   static place(view, event) {
     const seen = Measure.ASIDE.map(([x, y]) => Measure.#met(view, { clientX: event.clientX + x, clientY: event.clientY + y }));
-    const edges = seen.flatMap((hit) => hit ? Measure.#edges(view, hit) : []).map(({ place, isEnd }) => {
+    const edges = seen.flatMap((hit) => hit ? Measure.#edges(view, hit) : []).map(({ place, isEnd, name }) => {
       const [x, y] = view.onScreen(place), away = Math.hypot(x - event.clientX, y - event.clientY);
-      return { place, away, on: isEnd ? "a corner" : "an edge", order: isEnd ? away - Measure.NEAR : away }; // a corner near it is meant
-    }).filter(({ place, away }) => away < Measure.NEAR && !view.section.hides(place)).sort((a, b) => a.order - b.order);
+      return { place, away, name, on: isEnd ? "a corner" : "an edge", order: isEnd ? away - Measure.NEAR : away }; // a corner near it is meant
+    }).filter(({ place, away, name }) => away < Measure.NEAR && !view.section.hides(place, name)).sort((a, b) => a.order - b.order);
     return edges.length ? { place: edges[0].place, on: edges[0].on, normal: null } : seen[0] && { ...seen[0], on: "a face" };
   }
 
   // What a click meets: a body that is cut, or a surface. Walls and sonotrode are seen through from behind.
   static #met(view, event) {
     const { section } = view, ray = view.ray(event), cut = section.on ? ray.intersectPlane(section.plane, new THREE.Vector3()) : null;
-    if (cut && ray.direction.dot(section.plane.normal) > 0 && section.bodyAt(cut)) return { place: cut, normal: section.plane.normal.clone() };
-    return view.hits(event, Object.keys(Section.SURFACES).filter((name) => view.get(name)?.visible))
+    const hit = view.hits(event, Object.keys(Section.SURFACES).filter((name) => view.get(name)?.visible))
       .find(({ name, normal }) => Section.SURFACES[name][2] !== "shell" || normal.dot(ray.direction) > 0) ?? null;
+    if (!cut || !(ray.direction.dot(section.plane.normal) > 0) || !section.bodyAt(cut)) return hit;
+    const isBefore = hit && ray.origin.distanceTo(hit.place) < ray.origin.distanceTo(cut); // on a body that is left whole
+    return isBefore ? hit : { place: cut, normal: section.plane.normal.clone() };
   }
 
   // Places on edges and on the outlines of a section, near what a click meets.
@@ -104,7 +106,7 @@ class Measure {
     if (name) {
       const { matrixWorld } = view.get(name), own = place.clone().applyMatrix4(matrixWorld.clone().invert());
       const edge = Measure.nearest(Measure.sharp(view.get(name)), own, near);
-      if (edge) found.push({ ...edge, place: edge.place.applyMatrix4(matrixWorld) });
+      if (edge) found.push({ ...edge, name, place: edge.place.applyMatrix4(matrixWorld) });
     }
     return found.filter(Boolean);
   }

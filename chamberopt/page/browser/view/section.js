@@ -11,6 +11,7 @@ class Section {
   #fills = new Map();
   #outlines = new Map(); // ends of the lines that bound each body in the plane
   #stale = false;
+  #spares = ""; // body that stays whole, as a drawing does not cut a shaft
 
   constructor(view) {
     this.view = view;
@@ -18,9 +19,11 @@ class Section {
     this.on = false;
   }
 
-  // Cut by the plane of a unit normal at a distance from the origin; the normal points to what is kept.
-  cut(normal, distance) {
+  // Cut by the plane of a unit normal at a distance from the origin; the normal points to what is kept. A body may stay whole.
+  cut(normal, distance, spares = "") {
     this.plane.set(new THREE.Vector3(...normal), -distance);
+    if (spares !== this.#spares) this.off();
+    this.#spares = spares;
     if (!this.on) {
       this.on = true;
       for (const [name, mesh] of this.view.all()) this.take(name, mesh);
@@ -46,7 +49,8 @@ class Section {
   // Say that surfaces are gone, hidden or elsewhere.
   change() { this.#stale = true; }
 
-  hides(place) { return this.on && this.plane.distanceToPoint(place) < -1e-6 * this.view.home.size; }
+  // Whether the section takes away a place, or a place of a surface.
+  hides(place, name = "") { return this.on && this.#cuts(name) && this.plane.distanceToPoint(place) < -1e-6 * this.view.home.size; }
 
   // Cut a surface or lines that the view has got.
   take(name, mesh) {
@@ -107,7 +111,7 @@ class Section {
     for (const body of Section.BODIES) this.#fill(body);
   }
 
-  #cuts(name) { return name in Section.SURFACES || ["edges", "rim"].includes(name); }
+  #cuts(name) { return name in Section.SURFACES ? Section.SURFACES[name][0] !== this.#spares : ["", "edges", "rim"].includes(name); }
   #kindOf(body) { return Object.values(Section.SURFACES).find(([one]) => one === body)[1]; }
   #order(body = "part") { return 10 + 2 * Section.BODIES.indexOf(body); }
   #clip(material, planes) { Object.assign(material, { clippingPlanes: planes, needsUpdate: true }); }

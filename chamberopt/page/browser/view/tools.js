@@ -10,6 +10,7 @@ class Tools {
   #cut = { normal: [0, -1, 0], low: -1, high: 1 };
   #isFlipped = false;
   #isChosen = false; // whether a user chose across which axis
+  #isOpened = false; // whether the chamber was cut open for a first look
 
   // Views that a section and measuring serve together; the controls are put into `place`.
   constructor(views, place) {
@@ -26,6 +27,8 @@ class Tools {
     this.slider = make("input", { type: "range", ariaLabel: "place of the section" });
     this.at = make("input", { type: "number", step: "any", ariaLabel: "place of the section in mm" });
     this.flip = make("button", { textContent: "Flip", title: "show the other side" });
+    this.cutsPart = make("input", { type: "checkbox", checked: true });
+    this.cutsPart.addEventListener("change", () => this.#apply());
     this.told = make("output", {});
     this.parallel = make("button", { textContent: "Parallel", title: "parallel lines of sight, so that equal lengths are equal in the view; or as the eye sees" });
     this.parallel.addEventListener("click", () => {
@@ -40,11 +43,11 @@ class Tools {
     this.chamber = make("input", { type: "checkbox", checked: true });
     this.chamber.addEventListener("change", () => this.#hide(Tools.CHAMBER, !this.chamber.checked));
     const chamber = make("label", { hidden: true }, this.chamber, " show the chamber");
-    this.controls = make("span", { hidden: true, className: "cut" }, this.by, this.slider, make("label", {}, this.at, " mm"), this.flip);
+    this.controls = make("span", { hidden: true, className: "cut" }, this.by, this.slider, make("label", {}, this.at, " mm"), this.flip, make("label", {}, this.cutsPart, " cut the part"));
     this.element = make("div", { className: "tools" }, this.section, this.measure, this.from, this.parallel, chamber, this.controls, this.told);
     this.ruler = new Measure(views, (text) => { this.told.textContent = text; });
     for (const button of [this.section, this.measure, this.parallel]) button.setAttribute("aria-pressed", "false");
-    this.section.addEventListener("click", () => this.#turn(this.section.ariaPressed !== "true"));
+    this.section.addEventListener("click", () => { this.cutsPart.checked = true; this.#turn(this.section.ariaPressed !== "true"); });
     this.measure.addEventListener("click", () => this.#measure(this.measure.ariaPressed !== "true"));
     this.by.addEventListener("change", () => { this.#isChosen = true; this.#begin(); });
     this.slider.addEventListener("input", () => { this.at.value = Tools.rounded(this.slider.value); this.#apply(); });
@@ -82,12 +85,26 @@ class Tools {
     return Math.abs(sight.x) > Math.abs(sight.y) ? "x" : "y";
   }
 
-  // Cut in the middle, so that the eye sees the section, or wait for the click on a face.
+  // Cut a chamber that is new open round its whole part, so that part, walls, holder and sonotrode are seen at once; unless the user has closed the one before.
+  open() {
+    if (this.#isOpened && (this.section.ariaPressed !== "true" || this.cutsPart.checked)) return;
+    this.#isOpened = true;
+    this.cutsPart.checked = false;
+    this.#turn(true);
+  }
+
+  // Cut nothing: the chamber is gone.
+  close() {
+    this.#isOpened = false;
+    this.#turn(false);
+  }
+
+  // Cut in the middle, so that the eye sees the section, or wait for the click on a face. A chamber that is cut round its part is cut in its own middle.
   #begin() {
     const { by } = this, [first] = this.views, axis = ["x", "y", "z"].indexOf(by.value);
     this.#isFlipped = false;
     if (axis < 0) { this.#waitForFace(); return; }
-    const normal = [0, 0, 0], { low, high } = first.extent();
+    const normal = [0, 0, 0], { low, high } = first.extent(this.cutsPart.checked || !first.get("walls") ? undefined : ["walls"]);
     normal[axis] = first.camera.position.getComponent(axis) > first.orbit.target.getComponent(axis) ? -1 : 1;
     this.#cut = { normal, sign: normal[axis], from: 0 };
     this.#range(low[axis], high[axis], (low[axis] + high[axis]) / 2);
@@ -120,7 +137,7 @@ class Tools {
   #apply() {
     const { normal, sign, from } = this.#cut, way = this.#isFlipped ? -1 : 1;
     const distance = from + sign * Number(this.at.value);
-    for (const view of this.views) view.section.cut(normal.map((x) => way * x), way * distance);
+    for (const view of this.views) view.section.cut(normal.map((x) => way * x), way * distance, this.cutsPart.checked ? "" : "part");
   }
 
   // A button that hides the surfaces of a kind in all views, and shows them again.

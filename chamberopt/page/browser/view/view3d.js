@@ -226,11 +226,11 @@ class View3D {
   // Names and surfaces, lines and texts.
   all() { return [...this.#meshes].map(([name, { mesh }]) => [name, mesh]); }
 
-  // Box round the surfaces that a section cuts: { low, high }.
-  extent() {
+  // Box round the surfaces of these names, by default those that a section cuts: { low, high }.
+  extent(names = Object.keys(Section.SURFACES)) {
     const low = new THREE.Vector3(Infinity, Infinity, Infinity), high = low.clone().negate(), corner = new THREE.Vector3();
     for (const [name, mesh] of this.all()) {
-      if (!(name in Section.SURFACES) || !mesh.visible) continue;
+      if (!names.includes(name) || !mesh.visible) continue;
       if (!mesh.geometry.boundingBox) mesh.geometry.computeBoundingBox();
       const ends = [mesh.geometry.boundingBox.min, mesh.geometry.boundingBox.max];
       mesh.updateWorldMatrix(true, false);
@@ -300,8 +300,8 @@ class View3D {
   // { name, triangle, corner: its closest point, place, normal }.
   hits(event, names) {
     const meshes = names.map((name) => this.get(name)).filter(Boolean);
-    return this.#caster(event).intersectObjects(meshes, false).filter(({ point }) => !this.section.hides(point)).map((hit) => {
-      const name = names.find((one) => this.get(one) === hit.object), position = hit.object.geometry.getAttribute("position");
+    return this.#caster(event).intersectObjects(meshes, false).map((hit) => [hit, names.find((one) => this.get(one) === hit.object)]).filter(([{ point }, name]) => !this.section.hides(point, name)).map(([hit, name]) => {
+      const position = hit.object.geometry.getAttribute("position");
       const place = hit.object.worldToLocal(hit.point.clone());
       const far = (i) => new THREE.Vector3().fromBufferAttribute(position, i).distanceTo(place);
       const corner = [hit.face.a, hit.face.b, hit.face.c].reduce((best, i) => far(i) < far(best) ? i : best);
