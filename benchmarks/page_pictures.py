@@ -89,7 +89,7 @@ def page_pictures(part: Path, target: str, folder: Path) -> None:
         page.wait_for_timeout(500)
         page.screenshot(path=folder / "page_target.png")
         page.click("nav [data-tab=numbers]")
-        page.click(".tools >> text=Section")
+        page.check(".tools label:has-text('cut the part') input")
         page.select_option(".tools select", "y")
         page.wait_for_timeout(500)
         page.screenshot(path=folder / "page_section.png")

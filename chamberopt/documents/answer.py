@@ -135,9 +135,10 @@ def answer_lines(result: Result, start: Result | None = None) -> list[AnswerLine
     much less hard a study's best chamber peens than the start, what each step does, which limits of
     zones and constraints are met, and name doubts about the calibration.
     """
-    of_time = time_lines(result) or [*_unresolved_lines(result)]
-    lines = [*of_time, *shot_lines(result), *range_answer(result)]
+    lines = [*time_lines(result), *shot_lines(result), *range_answer(result)]
     lines += intensity_lines(result.design, result.metrics)
+    if not any(one.warns for one in lines):
+        lines += _unresolved_lines(result)
     lines += [
         *_ended_lines(result),
         *_softer_lines(result, start),

@@ -94,11 +94,13 @@ def picked_answer(mesh: PartMesh, picked: Sequence[Picked]) -> bytes:
 def face_names(mesh: PartMesh, face: np.ndarray) -> dict[int, str]:
     """Return the names that the proposal gives to faces, by the number of each.
 
+    A face of several surfaces has the name of the first.
+
     Args:
         face: number of the face of each triangle, (m,).
     """
     names: dict[int, str] = {}
-    for one in _surfaces(mesh):
+    for one in reversed(_surfaces(mesh)):
         within = np.bincount(face, ~one.triangles) == 0
         names |= {int(k): one.name for k in np.flatnonzero(within)}
     return names

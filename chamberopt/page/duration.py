@@ -34,7 +34,7 @@ MINUTE, HOUR = 60, 3600
 SPREAD = 3
 # A design is tried for MOMENT_S of simulation, and given up after TRY_S. Its pace then is so many
 # times off: the balls fly higher later on, and other work takes cores.
-MOMENT_S, TRY_S, UNSURE = 2.0, 60.0, 1.5
+MOMENT_S, TRY_S, UNSURE = 2.0, 120.0, 1.5
 
 
 def duration_in_words(path: Path, results: Iterable[Path]) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from chamberopt.design.load import save_design
-from chamberopt.page.duration import _in_words, _whole_seconds, duration_in_words
+from chamberopt.page.duration import _in_words, _whole_seconds, duration_in_words, tried_duration
 from chamberopt.results.load import Result
 from tests.helpers.results.short_plate import plate_result
 from tests.helpers.synthetic import DESIGNS
@@ -35,6 +35,14 @@ def test_a_study_takes_as_long_as_its_evaluations(result: Result, tmp_path: Path
     known = SimpleNamespace(study=SimpleNamespace(seconds=366.0, evaluations=6))
     like: Any = SimpleNamespace(record=known)
     assert _whole_seconds(result.design, 9, like) == 549.0
+
+
+def test_a_design_without_results_is_tried_for_a_moment(result: Result, tmp_path: Path) -> None:
+    """A study is not."""
+    save_design(result.design, tmp_path / "a.toml")
+    assert tried_duration(tmp_path / "a.toml").startswith("about ")
+    (tmp_path / "study.toml").write_text('design = "a.toml"\n[vary]\n')
+    assert tried_duration(tmp_path / "study.toml") == ""
 
 
 def test_nothing_is_said_of_another_part(result: Result) -> None:
