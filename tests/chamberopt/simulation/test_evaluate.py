@@ -298,15 +298,18 @@ def test_a_replica_tells_how_far_it_has_come() -> None:
     setting = ReplicaSetting(design, chamber, chamber_mesh(chamber))
     here, elsewhere = Underway(setting, setting), Underway(setting, setting._replace())
     seen: list[float] = []
-    simulate_replica(setting, 1, lambda seed, part: seen.append(part))
+    simulate_replica(setting, 1, lambda seed, part, held: seen.append(part))
     assert seen == sorted(seen)
     assert 6 <= len(seen) <= 8  # at least every 0.2 s
     assert seen[-1] == pytest.approx(1.0)
     here.task(setting, 1)
     elsewhere.task(setting, 1)
     assert (here.done, elsewhere.done) == (pytest.approx(1.0), 0.0)
-    here.tell(2, 0.25)
+    here.tell(2, 0.25, np.array([[1e-3, 2e-3, 3e-3]]))
     assert here.done == pytest.approx(1.25)
+    assert here.held() == {"balls": 1, "place": "(1.0, 2.0, 3.0) mm"}
+    here.tell(2, 1.0, np.array([[1e-3, 2e-3, 3e-3]]))
+    assert here.held() == {"balls": 0, "place": ""}  # it runs no more
 
 
 def test_a_target_that_no_ball_touches_has_no_figures(tmp_path: Path) -> None:
