@@ -13,8 +13,7 @@ import numpy as np
 from chamberopt.chamber.thin_part import thickness_to_simulate
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
-from chamberopt.geometry.cut import cut_at_box, cut_at_distance
-from chamberopt.geometry.face_shapes import beside_toes
+from chamberopt.geometry.cut import cut_at_box, with_beside
 from chamberopt.geometry.faces import Border, Faces
 from chamberopt.geometry.heights import lowest_over
 from chamberopt.geometry.meshes.part_mesh import (
@@ -471,16 +470,16 @@ def _simulated(
         origin = made.origin
         of_surface = made.normals, made.hollow, made.facts
         found = _Simulated(made.of_part(mesh), origin, chosen[origin], *of_surface)
-    if target.cut and target.box_mm is not None:
-        if is_wall:
-            text = "the part is drawn with its chamber, and its triangles are not divided"
-            raise InputError(f"part.target.cut: {text}; leave it out")
-        found = _cut(found, target.box_mm)
+    if is_wall and (target.cut or target.beside_mm is not None):
+        key = "cut" if target.cut else "beside_mm"
+        text = "the part is drawn with its chamber, and its triangles are not divided"
+        raise InputError(f"part.target.{key}: {text}; leave it out")
     if target.beside_mm is not None:
-        if is_wall:
-            text = "the part is drawn with its chamber, and its triangles are not divided"
-            raise InputError(f"part.target.beside_mm: {text}; leave it out")
         found = _with_beside(found, 1e-3 * target.beside_mm)
+        if target.box_mm is not None and not target.cut:
+            found = found._replace(target=found.target & _in_box(found.mesh, target.box_mm))
+    if target.cut and target.box_mm is not None:
+        found = _cut(found, target.box_mm)
     size = target.element
     return found if size is None else _remeshed(found, size)
 
@@ -493,28 +492,17 @@ def _cut(found: _Simulated, box_mm: Box) -> _Simulated:
 
 
 def _with_beside(found: _Simulated, beside: float) -> _Simulated:
-    """Return the part whose target takes what lies near on the faces beside its hollow edges.
+    """Return the part whose target takes what lies near on the faces that go on from it.
 
     Args:
         beside: how near [m].
     """
-    from sim_core import TriangleMesh, closest_points
-
-    mesh = found.mesh
-    near = beside_toes(mesh.vertices, mesh.triangles, found.target)
-    if not near.any():
-        raise InputError(
-            "part.target.beside_mm: the target meets no other face in a hollow edge; leave it out"
-        )
-    surface = TriangleMesh(mesh.vertices, mesh.triangles, found.target.astype(np.uint8))
-    far = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
-
-    def distance(places: np.ndarray) -> np.ndarray:
-        return closest_points(surface, places, far, tag=1).distance
-
-    made, is_near = cut_at_distance(_surface_of(found), distance, beside)
+    made, is_near = with_beside(_surface_of(found), found.target, beside)
     cut = _divided(found, made)
-    return cut._replace(target=cut.target | (near[made.parent] & is_near))
+    if (is_near & ~cut.target).any():
+        return cut._replace(target=is_near)
+    text = "no face goes on from the target, smoothly or over a hollow edge; leave it out"
+    raise InputError(f"part.target.beside_mm: {text}")
 
 
 def _surface_of(found: _Simulated) -> Surface:

@@ -160,8 +160,8 @@ class Target(Selection):
         0.1,
         100,
         "mm",
-        "also what lies so near on the faces that it meets in hollow edges, such as plates beside "
-        "the toes of a weld; absent: nothing",
+        "also what lies so near on the faces that go on from it, smoothly as beside a fillet, or "
+        "over hollow edges as beside the toes of a weld; absent: nothing",
         None,
     )
     reachable: bool = Field(
@@ -176,7 +176,7 @@ class Target(Selection):
     @property
     def in_words(self) -> str:
         """What is chosen, by the keys that are given."""
-        beside = f"with {plain(self.beside_mm or 0.0)} mm of the faces beside its hollow edges"
+        beside = f"with {plain(self.beside_mm or 0.0)} mm of the faces that go on from it"
         return "; ".join(filter(None, (super().in_words, beside if self.beside_mm else "")))
 
     @property

@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from chamberopt.geometry.face_shapes import beside as faces_beside
 from chamberopt.geometry.smoothing.divide import Surface, divided
 from chamberopt.geometry.triangles import area_vectors, edge_keys, sides_of, unit_vectors
 
@@ -94,17 +95,26 @@ def piece_beyond(
     return surface.vertices[used], numbers.reshape(-1, 3), values[used]
 
 
-def cut_at_distance(
-    surface: Surface, distance: Callable[[np.ndarray], np.ndarray], level: float
-) -> tuple[Surface, np.ndarray]:
-    """Return a surface divided at a distance from something, and marks of what is nearer, (k,).
+def with_beside(surface: Surface, own: np.ndarray, beside: float) -> tuple[Surface, np.ndarray]:
+    """Return a surface divided beside a piece of it, and marks of the piece with that, (k,).
 
     Args:
-        distance: returns the distance of each of some places (n, 3) from that thing [m], (n,).
-        level: the distance [m].
+        own: marks the triangles of the piece, (m,).
+        beside: how near to the piece the faces that go on from it are taken too [m].
     """
-    cut, beyond, _ = _cut_at_level(surface, distance, level, np.empty((len(surface.vertices), 0)))
-    return cut, beyond[cut.triangles].mean(axis=1) < 0.0
+    from sim_core import TriangleMesh, closest_points
+
+    near = faces_beside(surface.vertices, surface.triangles, own)
+    piece = TriangleMesh(surface.vertices, surface.triangles, own.astype(np.uint8))
+    far = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
+
+    def distance(places: np.ndarray) -> np.ndarray:
+        return closest_points(piece, places, far, tag=1).distance
+
+    none = np.empty((len(surface.vertices), 0))
+    cut, beyond, _ = _cut_at_level(surface, distance, beside, none)
+    is_near = beyond[cut.triangles].mean(axis=1) < 0.0
+    return cut, own[cut.parent] | (near[cut.parent] & is_near)
 
 
 def _cut_at_level(
@@ -113,7 +123,8 @@ def _cut_at_level(
     """Return a surface divided at a distance from something.
 
     Args:
-        distance, level: those of cut_at_distance.
+        distance: returns the distance of each of some places (n, 3) from that thing [m], (n,).
+        level: the distance [m].
         values: of each vertex, shape (n, k).
 
     Returns:

@@ -171,15 +171,18 @@ def leg_of_bevel(vertices: np.ndarray, triangles: np.ndarray, own: np.ndarray) -
     return 0.5 * width / math.cos(math.radians(float(np.average(turn, weights=long))))
 
 
-def beside_toes(vertices: np.ndarray, triangles: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Mark the triangles of the faces that a piece of a surface meets in hollow edges, (m,) bool.
+def beside(vertices: np.ndarray, triangles: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Mark the triangles of the faces that go on from a piece of a surface, (m,) bool.
+
+    They go on over its hollow edges, such as the toes of a weld, and smoothly, as from a fillet.
 
     Args:
         vertices, triangles: of the surface [m], (n, 3) and (m, 3).
         own: marks the piece, (m,) bool. None of it is marked.
     """
     sides, _, turn = _hollow_turns(vertices, triangles)
-    touching = np.unique(sides[_is_toe(sides, turn, own)] // 3)
+    one, other = own[sides // 3].T
+    touching = np.unique(sides[(one != other) & (turn > -BEVEL_DEG[0])] // 3)
     faces = Faces(vertices, triangles, BEVEL_DEG[0])
     return np.asarray(np.isin(faces.of_triangle, faces.of_triangle[touching]) & ~own)
 

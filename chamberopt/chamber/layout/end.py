@@ -25,9 +25,9 @@ import numpy as np
 
 from chamberopt.chamber.layout.pose import Turns, turns_down
 from chamberopt.chamber.layout.sizes import Sizes, middle_in_plan
-from chamberopt.chamber.layout.target import Target
+from chamberopt.chamber.layout.target import Keys, Target
 from chamberopt.design.shapes.outlines import area_inside
-from chamberopt.geometry.cut import cut_at_box, facets
+from chamberopt.geometry.cut import cut_at_box, facets, with_beside
 from chamberopt.geometry.heights import lowest_over
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import convex_hull
@@ -280,7 +280,9 @@ def strip(mesh: PartMesh, target: Target, turns: Turns, longest: float) -> HeldE
     strips = Strips(axis, low + shift, pitch, (0.0,) * count, 0)
 
     def area_in(number: int) -> float:
-        cut = cut_shape(mesh, target.triangles, strips.box_mm(mesh, number))
+        cut = cut_shape(
+            mesh, target.triangles, {**target.keys, "box_mm": strips.box_mm(mesh, number)}
+        )
         return float(areas(cut.vertices, cut.triangles)[cut.target].sum())
 
     each = tuple(area_in(k) for k in range(count))
@@ -320,20 +322,24 @@ def _off_faces(mesh: PartMesh, target: np.ndarray, axis: int, places: np.ndarray
     return 0.0
 
 
-def cut_shape(mesh: PartMesh, target: np.ndarray, box_mm: list[list[float]] | None) -> Shape:
-    """Return a part with its target cut at a box, if there is one.
+def cut_shape(mesh: PartMesh, target: np.ndarray, keys: Keys) -> Shape:
+    """Return a part with its target, which takes what lies beside it and is cut at a box.
 
     Args:
-        target: marks the triangles of the target before it is cut, (m,).
-        box_mm: low and high corner [mm].
+        mesh, target: the part, and marks of the triangles that its target's surfaces have, (m,).
+        keys: those of the target, of which `beside_mm` and `box_mm` count.
     """
-    if box_mm is None:
-        return Shape(mesh.vertices, mesh.triangles, target)
-    box = 1e-3 * np.array(box_mm)
-    cut = cut_at_box(facets(mesh.vertices, mesh.triangles), box, target)
-    middle = cut.vertices[cut.triangles].mean(axis=1)
-    inside = ((middle > box[0]) & (middle < box[1])).all(axis=1)
-    return Shape(cut.vertices, cut.triangles, target[cut.parent] & inside)
+    made = facets(mesh.vertices, mesh.triangles)
+    if beside_mm := keys.get("beside_mm"):
+        made, target = with_beside(made, target, 1e-3 * beside_mm)
+    if (box_mm := keys.get("box_mm")) is not None:
+        box = 1e-3 * np.array(box_mm)
+        rows = np.arange(len(made.triangles))
+        cut = cut_at_box(replace(made, parent=rows), box, target)
+        middle = cut.vertices[cut.triangles].mean(axis=1)
+        inside = ((middle > box[0]) & (middle < box[1])).all(axis=1)
+        made, target = cut, target[cut.parent] & inside
+    return Shape(made.vertices, made.triangles, target)
 
 
 def _is_one_piece(mesh: PartMesh, of_end: np.ndarray) -> bool:

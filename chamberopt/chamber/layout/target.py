@@ -70,6 +70,7 @@ SHARPER_DEG = 45.0, 60.0  # of edges, where those of CREASE_DEG part a coarse me
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
 BY_PROGRAM = re.compile(r"(?:created|exported|generated|written)[\s_-]+(?:by|from|with)\b", re.I)
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
+FILLETS = re.compile("fillets of ", re.I)
 FACE = re.compile(r"face (\d+)", re.I)
 FLAT_DEG = 5.0  # largest angle in a face that is flat
 AROUND = 0.1  # share of the fillets' area from which on a face is one in which they lie
@@ -92,7 +93,7 @@ class Surface:
     colour: str = ""  # colour of just these triangles in the file
     alone: str = ""  # names of each of its faces, and where they look, if they are few
     raises_stress: bool = False  # whether such a form raises stress, as fillets and welds do
-    beside_mm: float = 0.0  # what a target of it takes of the faces beside its hollow edges
+    beside_mm: float = 0.0  # what a target of it takes of the faces that go on from it
 
 
 @dataclass(frozen=True)
@@ -345,7 +346,9 @@ def _fillets(mesh: PartMesh) -> list[Surface]:
         count = f"{len(own)} faces, " if len(own) > 1 else ""
         name, marked = f"fillets of {1e3 / widest:.3g} mm", np.isin(faces.of_triangle, own)
         text = count + area_in_mm2(area)
-        found.append((area, Surface(name, {"faces": keys}, marked, text, raises_stress=True)))
+        beside_mm = max(0.5 * round(2e3 / widest), 0.5)
+        one = Surface(name, {"faces": keys}, marked, text, raises_stress=True, beside_mm=beside_mm)
+        found.append((area, one))
     return [one for _, one in sorted(found, key=lambda pair: -pair[0])]
 
 
@@ -461,11 +464,13 @@ def _joined(chosen: Sequence[Surface], reason: str) -> Target:
         text = "names of the file and faces cannot be one target; give one kind"
         raise InputError(f"--target: given {[one.name for one in chosen]}; {text}")
     marked = np.any([one.triangles for one in chosen], axis=0)
-    if beside_mm := max(one.beside_mm for one in chosen):
-        keys["beside_mm"] = beside_mm
+    if all(one.beside_mm for one in chosen):
+        keys["beside_mm"] = beside_mm = max(one.beside_mm for one in chosen)
+        where = "the toes, as wide as the leg of the weld by rule of thumb, as cracks begin there"
+        if FILLETS.match(chosen[0].name):
+            where = "the fillets, as wide as their radius by rule of thumb, so that it runs out"
         reason = (
-            f"with {beside_mm:g} mm of the faces beside the toes, as wide as the leg of the weld "
-            "by rule of thumb, as cracks begin there (no source read, "
+            f"with {beside_mm:g} mm of the faces beside {where} (no source read, "
             f"part.target.beside_mm changes it); {reason}"
         )
     names = [one.name for one in chosen]

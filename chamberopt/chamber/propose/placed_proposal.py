@@ -263,9 +263,10 @@ def _set_up(given: Given, stance: Stance) -> _Setup:
         hanging := hanging_turns(mesh, target, turns, diameter, wanted)
     ):
         turns, why = hanging, ON_END
-    shape = cut_shape(mesh, target.triangles, target.keys.get("box_mm"))
+    shape = cut_shape(mesh, target.triangles, target.keys)
     if end is not None and end.room_mm is not None:  # the room is round all of that
-        shape = cut_shape(mesh, np.ones(len(mesh.triangles), dtype=bool), end.room_mm)
+        whole = np.ones(len(mesh.triangles), dtype=bool)
+        shape = cut_shape(mesh, whole, {"box_mm": end.room_mm})
     # Balls would lie on what holds an end at the side: it goes out through the wall instead.
     out = end.axis if end is not None and end.goes_out else None
     if spindle is not None:

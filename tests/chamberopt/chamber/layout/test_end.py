@@ -123,7 +123,7 @@ def test_a_face_beyond_the_wall_of_a_strip_closes_no_chamber() -> None:
     pin = (radius < 8.01) & (np.abs(body.face_normals[:, 2]) < 0.1)
     lying = mesh.vertices[:, [2, 0, 1]] + [0, 0, 30e-3]  # the pin along x
     box = [[-31.0, -31.0, -5.0], [31.0, 31.0, 5.0]]
-    middle = cut_shape(mesh, pin, box)
+    middle = cut_shape(mesh, pin, {"box_mm": box})
     for shape, at_wall, closed in (
         (Shape(mesh.vertices, mesh.triangles, pin), 3e-3, ("-x", "x")),
         (middle, 3e-3, ()),
@@ -250,7 +250,7 @@ def test_of_a_stubby_part_as_much_is_left_bare_as_a_holder_grips(long: float, sh
 
 def of_area(mesh: PartMesh, target: np.ndarray, box: list[list[float]] | None) -> float:
     """Area [mm²] of a target that is cut at a box."""
-    cut = cut_shape(mesh, target, box)
+    cut = cut_shape(mesh, target, {"box_mm": box})
     return 1e6 * float(areas(cut.vertices, cut.triangles)[cut.target].sum())
 
 

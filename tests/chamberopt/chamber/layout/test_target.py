@@ -26,6 +26,7 @@ from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from tests.chamberopt.chamber.layout.test_arbor import drum, part_of
+from tests.helpers.turned_parts import stepped_shaft
 
 FLUTES = 1300
 
@@ -277,5 +278,30 @@ def test_a_target_takes_a_strip_beside_its_hollow_edges(tmp_path: Path, wide: fl
     assert area == pytest.approx(2.0 * 60.0 * (wide * np.sqrt(2.0) + 2.0 * 2.0), rel=1e-3)
     body = trimesh.Trimesh(part.vertices, part.triangles, process=False)
     assert body.is_watertight
-    with pytest.raises(InputError, match="no other face in a hollow edge"):
+    with pytest.raises(InputError, match="no face goes on from the target"):
         posed_part(design.changed({"part.target.faces": (), "part.target.surface": ("all",)}))
+
+
+@pytest.mark.parametrize(("fillet", "sides"), [(2.0, 96), (3.0, 144)])
+def test_a_fillet_is_peened_with_a_strip_beside_it(
+    tmp_path: Path, fillet: float, sides: int
+) -> None:
+    """As wide as its radius on the journal and on the shoulder, and not over the shoulder's edge.
+
+    The shoulder goes on beyond the fillet by less than its radius: all of it is taken.
+    """
+    journal, collar = 15.0, 15.0 + 1.6 * fillet
+    body = stepped_shaft([(journal, 60.0), (collar, 30.0)], fillet, sides)
+    part_of(body)[1].export(tmp_path / "shaft.stl")
+    made = propose(tmp_path / "shaft.stl", Wanted(unit="mm", ball_mm=1.0), lambda _: ())
+    assert made.tables["part.target"]["beside_mm"] == fillet
+    assert "so that it runs out" in made.reasons["part.target"]
+    design = made.design.changed({"part.target.reachable": False})
+    part = posed_part(design)[0]
+    area = 1e6 * float(part.area[part.target].sum())
+    middle = journal + fillet - 2.0 / np.pi * fillet  # of the arc, by Pappus
+    round_ = 2.0 * np.pi * middle * 0.5 * np.pi * fillet
+    shoulder = np.pi * (collar**2 - (journal + fillet) ** 2)
+    strip = 2.0 * np.pi * journal * fillet
+    assert area == pytest.approx(round_ + shoulder + strip, rel=0.03)
+    assert trimesh.Trimesh(part.vertices, part.triangles, process=False).is_watertight
