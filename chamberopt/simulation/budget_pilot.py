@@ -49,8 +49,8 @@ DENTS = 300  # in a wide window, after which no longer run is begun
 POINTS = 5000  # middles of windows; with 20,000 the time of a hip stem differed by 0.6 %
 FEW = 40.0  # dents in the median of the narrowest windows; 25 are needed (proposed_budget)
 # Of all replicas: a run that would have more is not begun, unless it is the first. The second is
-# for a shot that still slows down.
-COLLISIONS, UNSETTLED = 2e6, 8e6
+# for a shot that still slows down, the third where poses are not told apart otherwise.
+COLLISIONS, UNSETTLED, LONGER = 2e6, 8e6, 8e6
 ENOUGH = 30  # dents from which on they bound the time to 98 %
 ROUGH = 0.2  # share of the target in windows that tell an intensity roughly
 
@@ -118,12 +118,14 @@ def measure_budget(
     progress: Progress | None = None,
     longest: float = math.inf,
     is_brief: bool = False,
+    most: float = COLLISIONS,
 ) -> Measured:
     """Simulate a design briefly, and return what its budget follows from.
 
     Args:
         longest: time to 98 % [s] above which nothing more is wanted.
         is_brief: the shot need not settle, as one of several designs is chosen first.
+        most: collisions above which no further run is begun, once the shot settles.
     Raises:
         TooSlowError: the design takes longer than that.
         InputError: the shot does not fit, the target has no figures, or it was not hit.
@@ -132,6 +134,7 @@ def measure_budget(
     slow, friction = at_slow_end(design)
     area = float(chamber.part.area[chamber.part.target].sum())
     target, mesh, time = exposed_target(chamber), chamber_mesh(chamber), FIRST_TIME
+    enough = DENTS / WIDEST * most / COLLISIONS
     while True:
         accuracy = {
             "replicas": REPLICAS,
@@ -161,8 +164,8 @@ def measure_budget(
         if least > longest:
             raise TooSlowError(f"98 % after more than {rounded(least, 1)} s")
         collisions = sum(one.replica.collisions["total"] for one in timed)
-        most = COLLISIONS if settled or is_brief else UNSETTLED
-        if (settled and hits >= DENTS / WIDEST) or GROWTH * collisions > most:
+        allowed = most if settled or is_brief else UNSETTLED
+        if (settled and hits >= enough) or GROWTH * collisions > allowed:
             break
         time *= GROWTH
     replicas = [_after(warmup, one) for one in timed]

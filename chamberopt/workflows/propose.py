@@ -24,6 +24,7 @@ from chamberopt.chamber.propose.proposed_intensity import (
     as_no_wish,
     gives,
     is_off,
+    larger_balls,
     larger_instead,
     of_ball_sizes,
     propose_intensity,
@@ -56,7 +57,7 @@ from chamberopt.design.shot import ShotSize
 from chamberopt.peening.intensity_pilot import predict_intensity
 from chamberopt.pictures.part import draw_target
 from chamberopt.results.vtp_files import pyvista
-from chamberopt.simulation.budget_pilot import measure_budget
+from chamberopt.simulation.budget_pilot import COLLISIONS, LONGER, measure_budget
 from sim_core import SimulationError
 
 if TYPE_CHECKING:
@@ -249,12 +250,14 @@ class _Sought(NamedTuple):
         is_wish: somebody wished for it. Otherwise it is the usual one of a stated alloy, without
             which a proposal may do.
         reasons: which poses were tried, by dotted name.
+        by_rule: diameter of the balls that geometry alone gives [mm], and the reason for them.
     """
 
     wanted: Wanted
     asked: WantedIntensity | None
     is_wish: bool
     reasons: dict[str, str]
+    by_rule: tuple[float, str]
 
 
 @dataclass(frozen=True)
@@ -275,13 +278,17 @@ class _Pilots:
 
         Raises InputError if an intensity that was asked for cannot be told.
         """
-        now, wanted = self._chosen_way(first)
-        return replace(self._improved(now, wanted), poses=now.made.poses)
+        now, wanted, by_rule = self._chosen_way(first)
+        return replace(self._improved(now, wanted, by_rule), poses=now.made.poses)
 
-    def _improved(self, now: Compared, wanted: Wanted) -> Proposal:
-        """Return a proposal for a chosen way, with balls, amplitude, times and budget by pilots."""
-        by_geometry = setting_of(now.made).ball_mm
-        sought = self._sought(now, wanted)
+    def _improved(self, now: Compared, wanted: Wanted, by_rule: tuple[float, str]) -> Proposal:
+        """Return a proposal for a chosen way, with balls, amplitude, times and budget by pilots.
+
+        Args:
+            by_rule: diameter of the balls that geometry alone gives [mm], and the reason for them.
+        """
+        by_geometry = by_rule[0]
+        sought = self._sought(now, wanted, by_rule)
         if sought.asked:
             self.begin(INTENSITY)
             now, sought = self._with_intensity(now, sought, sought.asked)
@@ -304,35 +311,75 @@ class _Pilots:
             trials = with_time(trials, setting_of(now.made).ball_mm, found)
         return replace(_in_budget(now.made, found), trials=trials)
 
-    def _chosen_way(self, first: Proposal) -> tuple[Compared, Wanted]:
-        """Return the pose, sonotrodes and charge that peen quickest, and the wishes for them."""
+    def _chosen_way(self, first: Proposal) -> tuple[Compared, Wanted, tuple[float, str]]:
+        """Return the pose, sonotrodes and charge that peen quickest, and the wishes for them.
+
+        Third is the diameter of the balls that geometry alone gives [mm], and the reason for them.
+        """
         self.begin(TIME)
         wanted = self.wishes.geometry
         pose, fewer = first.thick_pose, first.without_fillets
         if pose or fewer:  # all proposals hold the part alike
             wanted = replace(wanted, may_leave_end=False, thick_pose=pose, without_fillets=fewer)
-        way = Way(first, wanted, self._measure(first, is_brief=True))
+        by_rule = Way(first, wanted, self._measure(first, is_brief=True))
+        way = self._strong_enough(by_rule)
         self.begin(WAYS)
         made, wanted, found = propose_quicker(
-            way, self._each, turned_over, self._briefly, self.teller.step
+            way, self._each, turned_over, self._briefly, self.teller.step, self._longer
         )
         now = Compared(*propose_second_pose(made, found, self._briefly))
         over = bool(now.made.design.steps)
         is_turned, leaves_end = turns(now.made), now.made.leaves_end
-        wanted = replace(wanted, turned_over=over, may_turn=is_turned, may_leave_end=leaves_end)
-        return now, wanted
+        wanted = replace(
+            wanted,
+            ball_mm=self.wishes.geometry.ball_mm,
+            turned_over=over,
+            may_turn=is_turned,
+            may_leave_end=leaves_end,
+        )
+        of_rule = now.made if way is by_rule else first
+        if way is not by_rule:
+            larger = {"shot.diameter_mm": way.made.reasons["shot.diameter_mm"]}
+            now = now._replace(made=_told(now.made, larger))
+        return now, wanted, (setting_of(of_rule).ball_mm, of_rule.reasons["shot.diameter_mm"])
 
-    def _sought(self, now: Compared, wanted: Wanted) -> _Sought:
-        """Return what is sought for the part as it stands in a proposal.
+    def _strong_enough(self, way: Way) -> Way:
+        """Return a way with larger balls where all that suit the target are too weak.
+
+        Poses are compared with balls that may be taken.
+        """
+        made, known = way.made, way.found and way.found.intensity
+        asked = self._asked(made, way.found)
+        if asked is None or known is None:
+            return way
+        larger = larger_balls(made, way.wanted, asked, known.value)
+        if larger is None:
+            return way
+        wanted = replace(way.wanted, ball_mm=larger[0])
+        (other,) = self._each([wanted], made)
+        if other is None or other.sonotrode_count > made.sonotrode_count or new_harm(other, made):
+            return way
+        other = _told(other, {"shot.diameter_mm": larger[1]})
+        found = self._measure(other, is_brief=True)
+        return way if found is None else Way(other, wanted, found)
+
+    def _asked(self, made: Proposal, found: Measured | None) -> WantedIntensity | None:
+        """Return the intensity that is sought for a proposal; None if none is, or it is known.
 
         A stated alloy has a usual intensity, which a proposal should not miss.
+
+        Args:
+            found: what a pilot measured of it.
         """
-        made, found = now.made, now.found
-        intensity, asked = self.wishes.intensity, self.wishes.asked_intensity()
-        is_wish = intensity is not None or not wanted.alloy
-        if intensity == USUAL or (not is_wish and found and is_off(made, found.intensity)):
-            asked = usual_for(made)
-        return _Sought(wanted, asked, is_wish, _of_poses(made))
+        intensity, alloy = self.wishes.intensity, self.wishes.geometry.alloy
+        may_miss = intensity is None and alloy and found and is_off(made, found.intensity)
+        return usual_for(made) if intensity == USUAL or may_miss else self.wishes.asked_intensity()
+
+    def _sought(self, now: Compared, wanted: Wanted, by_rule: tuple[float, str]) -> _Sought:
+        """Return what is sought for the part as it stands in a proposal."""
+        is_wish = self.wishes.intensity is not None or not wanted.alloy
+        asked = self._asked(now.made, now.found)
+        return _Sought(wanted, asked, is_wish, _of_poses(now.made), by_rule)
 
     def _with_intensity(
         self, start: Compared, sought: _Sought, asked: WantedIntensity
@@ -367,7 +414,7 @@ class _Pilots:
     def _for_intensity(self, start: Proposal, sought: _Sought, asked: WantedIntensity) -> Compared:
         """Return a proposal for an intensity, and what a pilot measured of it."""
         again = partial(self._again, like=start)
-        made = propose_intensity(start, sought.wanted, asked, again, self._predict)
+        made = propose_intensity(start, sought.wanted, asked, again, self._predict, sought.by_rule)
         made = _told(made, sought.reasons)
         return Compared(made, self._measure(made, is_brief=True))
 
@@ -419,6 +466,10 @@ class _Pilots:
     def _briefly(self, made: Proposal, longest: float = math.inf) -> Measured | None:
         return self._measure(made, longest, is_told=False, is_brief=True)
 
+    def _longer(self, made: Proposal, longest: float = math.inf) -> Measured | None:
+        """Return what a longer pilot measured, where a brief one resolved no places."""
+        return self._measure(made, longest, is_told=False, is_brief=True, most=LONGER)
+
     def _each(
         self, wishes: Sequence[Wanted], like: Proposal | None = None
     ) -> list[Proposal | None]:
@@ -449,17 +500,18 @@ class _Pilots:
         longest: float = math.inf,
         is_told: bool = True,
         is_brief: bool = False,
+        most: float = COLLISIONS,
     ) -> Measured | None:
         """Return what the budget of a proposal follows from; None where no pilot can tell it.
 
-        The reason is told then, unless is_told is false. `longest` [s] and `is_brief` are those of
-        `measure_budget`. Raises TooSlowError if the time to 98 % is longer.
+        The reason is told then, unless is_told is false. `longest` [s], `is_brief` and `most` are
+        those of `measure_budget`. Raises TooSlowError if the time to 98 % is longer.
         """
         try:
             self.teller.compile(made.design, made.chamber, None)
             with self.teller.step("pilot run") as progress:
                 given = made.design, made.chamber, self.executor, progress
-                return measure_budget(*given, longest, is_brief)
+                return measure_budget(*given, longest, is_brief, most)
         except TooSlowError:
             raise
         except (InputError, SimulationError) as error:

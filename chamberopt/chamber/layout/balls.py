@@ -34,6 +34,9 @@ LEAST_FILLETS, MISSED_FILLETS = 0.005, 0.1
 # Share of the target that balls serve which an intensity takes, by heart: what geometry tells
 # is sure, and an intensity that is not calibrated is known to a factor of 2.5.
 MOSTLY = 0.85
+# Share of the target, and of its narrow fillets, that balls touch which an intensity takes though
+# they are larger than the rules of fillets and slots allow: these are of thumb, reach is known.
+REACHED = 0.98
 # Balls in the charge: of sizes that need more, the largest is taken that serves as well. Thousands
 # of small balls make weak dents, are hard to get back from a chamber, and are slow to simulate.
 MANY = 3000
@@ -204,14 +207,25 @@ def serving_sizes(fits: Sequence[SizeFit]) -> list[float]:
     ]
 
 
-def mostly_serving(fits: Sequence[SizeFit]) -> list[SizeFit]:
-    """Return the sizes larger than the proposed ball that serve MOSTLY of the target and jam not.
+def reaches(one: SizeFit) -> bool:
+    """Return whether balls of a size touch nearly all of the target, and jam in no gap."""
+    return min(one.touched, one.fillets) >= REACHED and not (one.jam or one.nearly_jam)
+
+
+def larger_sizes(fits: Sequence[SizeFit]) -> list[SizeFit]:
+    """Return the sizes larger than the proposed ball that an intensity may take.
+
+    They serve MOSTLY of the target or touch nearly all of it, and do not jam.
 
     Args:
         fits: sizes in ascending order.
     """
     largest = propose_ball(fits)[0]
-    return [one for one in fits if one.diameter > largest and one.served >= MOSTLY and not one.jam]
+    return [
+        one
+        for one in fits
+        if one.diameter > largest and ((one.served >= MOSTLY and not one.jam) or reaches(one))
+    ]
 
 
 def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:

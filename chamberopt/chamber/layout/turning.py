@@ -25,6 +25,9 @@ FLAT = 1e-9  # spread of the normals of flat rings, which all look along the axi
 OUTSIDE = 0.6  # of a part's radius, outside of which the target is for which it takes an arbor
 SHORT = 1.0  # largest length along an arbor over the diameter: longer parts stand or lie
 RPM = 60.0
+# A part so many times as long as wide that turned would stand high on end, and is turned by shops;
+# up to this mean cosine with its axis a target looks to both of its ends, or to neither.
+SLENDER, BOTH_WAYS = 1.5, 0.5
 
 
 class Spindle(NamedTuple):
@@ -104,6 +107,21 @@ def find_spindle(mesh: PartMesh, target: np.ndarray) -> Spindle | None:
     ring = _Ring.of(mesh, target)
     found = (Spindle(ring.weight @ ring.place, axis) for axis in _axes(ring))
     return next((one for one in found if ring.goes_round(one)), None)
+
+
+def slenderness(mesh: PartMesh, target: np.ndarray, one: Spindle) -> float:
+    """Return a part's length over its largest diameter, if shops turn one that is long; else 0.
+
+    They do not if its target looks to one end, as a flange's fillet does: that is peened on end.
+
+    Args:
+        target: marks the triangles to be peened, (m,).
+        one: the axis round which the target looks the same.
+    """
+    ring, places = _Ring.of(mesh, target), (mesh.vertices - one.point) @ frame_along(one.axis).T
+    if abs(ring.weight @ (ring.normal @ one.axis)) > BOTH_WAYS:
+        return 0.0
+    return float(np.ptp(places[:, 2]) / (2.0 * np.linalg.norm(places[:, :2], axis=1).max()))
 
 
 def _axes(ring: _Ring) -> Iterator[np.ndarray]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from chamberopt.chamber.layout.arbor import find_bores
 from chamberopt.chamber.layout.end import Shape, bare_end, held_end
+from chamberopt.chamber.layout.floor import SEVERAL
 from chamberopt.chamber.layout.pose import (
     AT_SIDE,
     TURNING,
@@ -27,7 +28,13 @@ from chamberopt.chamber.layout.target import (
     propose_target,
     surfaces,
 )
-from chamberopt.chamber.layout.turning import find_spindle, turning_bore, turning_pose
+from chamberopt.chamber.layout.turning import (
+    SLENDER,
+    find_spindle,
+    slenderness,
+    turning_bore,
+    turning_pose,
+)
 from chamberopt.chamber.propose.held_proposal import hangs_by_a_face, is_firm, is_held_thinly, rests
 from chamberopt.chamber.propose.placed_proposal import (
     LEAST_TOUCHED,
@@ -38,7 +45,14 @@ from chamberopt.chamber.propose.placed_proposal import (
     Given,
     proposed,
 )
-from chamberopt.chamber.propose.proposal import Proposal, Stance, Wanted, faults, touched_share
+from chamberopt.chamber.propose.proposal import (
+    COUNTED,
+    Proposal,
+    Stance,
+    Wanted,
+    faults,
+    touched_share,
+)
 from chamberopt.chamber.propose.proposed_clamp import grips_poorly
 from chamberopt.chamber.shop import usual_shop
 from chamberopt.common.errors import InputError
@@ -76,6 +90,8 @@ def propose(path: Path, wanted: Wanted, choose: Chooser) -> Proposal:
     shape = Shape(mesh.vertices, mesh.triangles, target.triangles)
     if wanted.pose == TURNING:
         return _turning(given, target)
+    if (turned := _slender_turned(given, target)) is not None:
+        return turned
     if wanted.pose is None:
         stance = Stance(target, *propose_pose(*shape))
     else:
@@ -125,6 +141,28 @@ def _turning(given: Given, target: Target) -> Proposal:
         raise InputError(NO_SPINDLE.format("the target looks the same round no axis"))
     turns, _ = turning_pose(spindle, mesh)
     return proposed(given, Stance(target, turns, TURNED, is_local=True, spindle=spindle))
+
+
+def _slender_turned(given: Given, target: Target) -> Proposal | None:
+    """Return a proposal in which a slender part turns by its ends, as shops turn it.
+
+    It is None where another pose is asked for, or where turning does harm or takes many sonotrodes.
+    """
+    wanted, mesh = given.wanted, given.mesh
+    is_open = wanted.pose is None and wanted.may_turn and wanted.shape in (None, "box")
+    if not is_open or wanted.thick_pose is not None or wanted.without_fillets:
+        return None
+    spindle = find_spindle(mesh, target.triangles)
+    if spindle is None or (long := slenderness(mesh, target.triangles, spindle)) < SLENDER:
+        return None
+    why = f"{TURNED}, as shops turn a part {long:.2g} times as long as wide, peened all round"
+    with suppress(InputError):
+        turns, _ = turning_pose(spindle, mesh)
+        made = proposed(given, Stance(target, turns, why, is_local=True, spindle=spindle))
+        is_harmless = not made.jams and all(one.kind in COUNTED for one in made.warnings)
+        if is_harmless and "holder" in made.tables and made.sonotrode_count <= SEVERAL:
+            return made
+    return None
 
 
 def _is_no_worse(other: Proposal, made: Proposal) -> bool:

@@ -328,7 +328,7 @@ def _built(
             tables = {**common, "part": part, **floor_tables(floor)}
             words = {"part.rotate_deg": f"{pose_in_words(given.mesh, given.known, placed)}: {why}"}
             if turning is not None:
-                words["part.rotate_deg"] = TURNED
+                words["part.rotate_deg"] = why if setup.stance.spindle else TURNED
                 its = "its shaft is" if setup.stance.spindle is None else "its ends are"
                 words["effects.part_turn"] = (
                     f"TURNED BY A DRIVE, at {RPM:g} rpm: {its} sealed in the wall"

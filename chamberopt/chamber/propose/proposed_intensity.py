@@ -16,6 +16,7 @@ from chamberopt.chamber.layout.balls import (
     MANY,
     MISSED,
     MISSED_FILLETS,
+    MOSTLY,
     OF_THIN,
     THIN_SHARE,
     fit_sizes,
@@ -76,16 +77,19 @@ def propose_intensity(
     intensity: WantedIntensity,
     again: Callable[[Wanted], Proposal],
     simulate: Callable[[Proposal], IntensityPilot | None],
+    by_rule: tuple[float, str] | None = None,
 ) -> Proposal:
     """Return a proposal with balls and an amplitude for a wanted intensity, and the reasons.
 
     Where all balls that serve the target as well as any are too weak, larger ones are taken that
-    serve most of it, and what this costs is told.
+    serve most of it or touch nearly all, and what this costs is told.
 
     Args:
-        made: the proposal by geometry alone.
+        made: the proposal to begin with.
         again: proposes the design for other wishes.
         simulate: runs a pilot of a proposal; None if its intensity is not resolved.
+        by_rule: diameter of the balls that geometry alone gives [mm], and the reason for them; by
+            default those of `made`.
     Raises:
         InputError: no pilot resolved the strength.
     """
@@ -96,7 +100,7 @@ def propose_intensity(
     possible = settings_of(made, wanted)
     settings, larger = possible.serving, possible.larger
     by_ball = {setting_of(made).ball_mm: made}
-    reason = made.reasons["shot.diameter_mm"]
+    small, reason = by_rule or (setting_of(made).ball_mm, made.reasons["shot.diameter_mm"])
     found: dict[Setting, IntensityPilot] = {}
     chosen, pilots = setting_of(made), 0
     while chosen not in found:
@@ -130,12 +134,33 @@ def propose_intensity(
         chosen = choose(intensity, left, _values(found), possible.served)
     one = by_ball[chosen.ball_mm]
     if chosen in possible.larger:
-        reason = _of_larger(chosen, setting_of(made).ball_mm, possible, _values(found))
+        reason = _of_larger(chosen, small, possible, _values(found))
         one = replace(one, reasons={**one.reasons, "shot.diameter_mm": reason})
     pilot = found[chosen]
     one = replace(one, strength_dents=pilot.dents, predicted=pilot.predicted)
     told = with_amplitude(one, chosen), intensity, pilot.predicted
-    return _told(*told, setting_of(made).ball_mm, reason)
+    return _told(*told, small, reason)
+
+
+def larger_balls(
+    made: Proposal, wanted: Wanted, intensity: WantedIntensity, known: float
+) -> tuple[float, str] | None:
+    """Return the diameter [mm] of larger balls with which poses are compared, and the reason.
+
+    None are needed unless all that suit the target are too weak for the intensity.
+
+    Args:
+        known: intensity of the proposal by a pilot [mmA].
+    """
+    now, possible = setting_of(made), settings_of(made, wanted)
+    simulated = {now: known}
+    larger = [one for one in possible.larger if one.amplitude_um == now.amplitude_um]
+    if any(intensity.off(expected_intensity(x, simulated)) >= 0.0 for x in possible.serving):
+        return None
+    chosen = choose(intensity, [now, *larger], simulated, possible.served)
+    if chosen == now:
+        return None
+    return chosen.ball_mm, _of_larger(chosen, now.ball_mm, possible, simulated)
 
 
 def _of_larger(
@@ -149,12 +174,18 @@ def _of_larger(
     """
     of_small = [one for one in possible.serving if one.ball_mm == small]
     best = max(expected_intensity(one, simulated) for one in of_small)
-    served, most = possible.served[chosen.ball_mm], possible.served[small]
-    loses = most - served > AS_GOOD
+    fit, of_rule = possible.fits[chosen.ball_mm], possible.fits[small]
+    loses = of_rule.served - fit.served > AS_GOOD
+    what = f"they suit {fit.served:.0%} of the target, and "
+    if fit.served < MOSTLY:
+        what = (
+            f"they touch {fit.touched:.0%} of the target, though {1.0 - fit.served:.0%} of it lies "
+            "in fillets of less than 2 or slots of less than 4 of their diameters, for which by a "
+            "rule of thumb smaller ones are taken: "
+        )
     return (
-        f"{LARGER if loses else LARGER.lower()}: they suit {served:.0%} of the target, and "
-        f"{small:g} mm would suit {most:.0%}, with about {plain(best, 2)} mmA (--ball-mm "
-        f"{small:g} takes these)"
+        f"{LARGER if loses else LARGER.lower()}: {what}{small:g} mm would suit "
+        f"{of_rule.served:.0%}, with about {plain(best, 2)} mmA (--ball-mm {small:g} takes these)"
     )
 
 

@@ -23,8 +23,10 @@ from typing import NamedTuple
 
 from chamberopt.chamber.layout.balls import (
     AS_GOOD,
+    MOSTLY,
+    SizeFit,
     fit_sizes,
-    mostly_serving,
+    larger_sizes,
     serving_sizes,
     sizes_to_try,
 )
@@ -55,13 +57,26 @@ class Settings(NamedTuple):
 
     Attributes:
         serving: balls that serve the target as well as any, with all amplitudes of the sonotrode.
-        larger: larger balls that serve most of it, with all amplitudes.
-        served: share of the target that each size serves, by diameter [mm].
+        larger: larger balls that serve most of it, or touch nearly all, with all amplitudes.
+        fits: how each size suits the target, by diameter [mm].
     """
 
     serving: list[Setting]
     larger: list[Setting]
-    served: dict[float, float]
+    fits: dict[float, SizeFit]
+
+    @property
+    def served(self) -> dict[float, float]:
+        """Share of the target that each size serves, by diameter [mm].
+
+        Larger balls that touch nearly all of it count as those that serve it best.
+        """
+        most = max((self.fits[one.ball_mm].served for one in self.serving), default=0.0)
+        larger = {one.ball_mm for one in self.larger}
+        return {
+            ball: most if ball in larger and one.served < MOSTLY else one.served
+            for ball, one in self.fits.items()
+        }
 
 
 def settings_of(made: Proposal, wanted: Wanted) -> Settings:
@@ -72,13 +87,15 @@ def settings_of(made: Proposal, wanted: Wanted) -> Settings:
         return [Setting(_in_mm(ball), one) for ball in diameters for one in amplitudes]
 
     if wanted.ball_mm is not None:
-        return Settings(with_each([made.design.shot.diameter]), [], {})
+        ball = made.design.shot.diameter
+        fits = fit_sizes(made.chamber.part, [ball])
+        return Settings(with_each([ball]), [], {_in_mm(ball): fits[0]})
     stock = (wanted.shop or usual_shop()).stock_mm(made.tables["shot"]["material"])
     part = made.chamber.part
     fits = fit_sizes(part, sizes_to_try(part, stock))
-    larger = with_each(one.diameter for one in mostly_serving(fits))
-    served = {_in_mm(one.diameter): one.served for one in fits}
-    return Settings(with_each(serving_sizes(fits)), larger, served)
+    larger = with_each(one.diameter for one in larger_sizes(fits))
+    by_ball = {_in_mm(one.diameter): one for one in fits}
+    return Settings(with_each(serving_sizes(fits)), larger, by_ball)
 
 
 def _in_mm(diameter: float) -> float:

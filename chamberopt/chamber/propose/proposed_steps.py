@@ -17,7 +17,14 @@ from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import shot_reach
 from chamberopt.chamber.checks.jams import gaps_in_reach, jam_gaps
 from chamberopt.chamber.checks.warning import WarningKind
-from chamberopt.chamber.layout.balls import AS_GOOD, MANY, MISSED_FILLETS, MOSTLY, fit_sizes
+from chamberopt.chamber.layout.balls import (
+    AS_GOOD,
+    MANY,
+    MISSED_FILLETS,
+    MOSTLY,
+    fit_sizes,
+    reaches,
+)
 from chamberopt.chamber.layout.floor import of_blocks
 from chamberopt.chamber.propose.proposal import (
     Proposal,
@@ -256,6 +263,8 @@ def with_finer_balls(
         finer = _with_shot(coarse, finer_mm)
         fine, most = fit_sizes(finer.chamber.part, [1e-3 * finer_mm, 1e-3 * coarse_mm])
         shares = f"{coarse_mm:g} mm serve {most.served:.0%}, {finer_mm:g} mm {fine.served:.0%}"
+        if reaches(most):
+            return None, ""
         for_fillets = fine.fillets > most.fillets + MISSED_FILLETS
         gain = fine.served - most.served
         if most.served < MOSTLY:

@@ -22,8 +22,15 @@ from chamberopt.chamber.layout.balls import MOST_BALLS
 from chamberopt.chamber.layout.floor import SEVERAL
 from chamberopt.chamber.layout.pose import AT_SIDE, TURNING, Pose
 from chamberopt.chamber.propose.held_proposal import rests
-from chamberopt.chamber.propose.proposal import PoseTrial, Proposal, Wanted, new_harm, with_charge
-from chamberopt.chamber.propose.proposed_budget import LONG, Measured, TooSlowError
+from chamberopt.chamber.propose.proposal import (
+    PoseTrial,
+    Proposal,
+    Wanted,
+    new_harm,
+    touched_share,
+    with_charge,
+)
+from chamberopt.chamber.propose.proposed_budget import COVERED, LONG, Measured, TooSlowError
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.common.progress import Progress, untold
@@ -33,10 +40,13 @@ SLOW = 600.0  # s until 98 % of the target are dented, from which on other ways 
 # Time of all sonotrodes over that of the way before, below which a way is taken. Pilots know a time
 # to 10 to 20 %. A way is no weaker than this share of the intensity before.
 QUICKER, AS_STRONG, HALF = 0.8, 0.8, 0.5
-POSES: tuple[Pose, ...] = (*AT_SIDE, TURNING)  # that are tried
+# That are tried, beside one that is evenly exposed and one of a slender part that turns.
+POSES: tuple[Pose, ...] = (*AT_SIDE, TURNING)
+OF_TURNED: tuple[Pose, ...] = ("standing", *AT_SIDE)
 LAYER = 2.0  # over half a layer
 NOT_COMPARED = "not compared: its places are not resolved"
 TRIED = "poses tried by pilots"  # begins the clause of a reason that tells all of them
+Measure = Callable[[Proposal, float], Measured | None]
 Counted = Callable[[str, int], AbstractContextManager[Progress]]
 SAME = 0.999  # cosine between the directions that point up, from which on a pose is no other one
 
@@ -53,10 +63,13 @@ def propose_quicker(
     first: Way,
     again: Callable[[Sequence[Wanted]], Sequence[Proposal | None]],
     turned_over: Callable[[Proposal], Proposal],
-    measure: Callable[[Proposal, float], Measured | None],
+    measure: Measure,
     counted: Counted = lambda *_: nullcontext(untold),
+    longer: Measure = lambda *_: None,
 ) -> Way:
     """Return the way that is quickest by pilots, of those with no more faults than the first.
+
+    A slender part that turns first is taken in another pose only if that is clearly quicker.
 
     Args:
         again: proposes a design for each of some wishes; None where no chamber can be built.
@@ -64,11 +77,12 @@ def propose_quicker(
         measure: simulates a proposal briefly; None if that cannot be done. Raises TooSlowError if
             the time to 98 % is longer than a given one [s].
         counted: begins a step that counts what is tried.
+        longer: simulates a proposal for longer than `measure`, where that resolved no places.
     """
     best = first
-    if _is_slow(first) and first.wanted.pose is None and not turns(first.made):
+    if _is_slow(first) and first.wanted.pose is None and not _turns_on_arbor(first.made):
         with counted("poses tried", len(POSES)) as progress:
-            best = _best_pose(first, again, turned_over, measure, progress)
+            best = _best_pose(first, again, turned_over, (measure, longer), progress)
     is_known = best.found is not None and best.found.places  # else a heavier one takes longer still
     if is_known and _is_slow(best) and 2 * best.made.design.shot.count <= MOST_BALLS:
         made = with_charge(best.made, LAYER)
@@ -89,15 +103,21 @@ def _best_pose(
     first: Way,
     again: Callable[[Sequence[Wanted]], Sequence[Proposal | None]],
     turned_over: Callable[[Proposal], Proposal],
-    measure: Callable[[Proposal, float], Measured | None],
+    pilots: tuple[Measure, Measure],
     progress: Progress,
 ) -> Way:
-    """Return the quickest way over all poses, which tells them all; see `propose_quicker`."""
-    best = first
+    """Return the quickest way over all poses, which tells them all; see `propose_quicker`.
+
+    Args:
+        pilots: `measure` and `longer` of `propose_quicker`.
+    """
+    measure, longer = pilots
+    best = first = _resolved(first, math.inf, longer)
     tried: list[tuple[Way, str]] = []
-    poses = dict(zip(POSES, again([replace(first.wanted, pose=one) for one in POSES]), strict=True))
-    for pose, over in product(POSES, (False, True)):
-        progress(POSES.index(pose), len(POSES), None)
+    tries = OF_TURNED if turns(first.made) else POSES
+    poses = dict(zip(tries, again([replace(first.wanted, pose=one) for one in tries]), strict=True))
+    for pose, over in product(tries, (False, True)):
+        progress(tries.index(pose), len(tries), None)
         if over and not (tried and _needs_both_sides(tried[-1][0], pose)):
             continue
         wanted = replace(first.wanted, pose=pose, turned_over=over)
@@ -120,7 +140,30 @@ def _best_pose(
         tried.append((one, harm))
         if not harm and _is_quicker(one, best):
             best = one
+    for number, (one, harm) in enumerate(tried):  # what is open is simulated for longer
+        if harm or not _is_rough(one, best) or _time(one) >= _time(best):
+            continue
+        try:
+            tried[number] = _resolved(one, _longest(one.made, best), longer), ""
+        except TooSlowError as error:
+            tried[number] = one, str(error)
+            continue
+        if _is_quicker(tried[number][0], best):
+            best = tried[number][0]
     return _with_pose_told(best, first, tried)
+
+
+def _resolved(one: Way, longest: float, longer: Measure) -> Way:
+    """Return a way whose places a longer pilot resolves, where the first one did not.
+
+    Where balls touch too little of the target, none would.
+
+    Args:
+        longest, longer: as of `measure` and of `propose_quicker`.
+    """
+    if one.found is None or one.found.places or touched_share(one.made) < COVERED:
+        return one
+    return one._replace(found=longer(one.made, longest) or one.found)
 
 
 def _needs_both_sides(one: Way, pose: Pose) -> bool:
@@ -144,6 +187,11 @@ def _is_slow(way: Way) -> bool:
 def turns(made: Proposal) -> bool:
     """Return whether the part of a proposal turns about an axis."""
     return made.design.effects.part_turn is not None
+
+
+def _turns_on_arbor(made: Proposal) -> bool:
+    """Return whether the part of a proposal turns on an arbor, not by its own ends."""
+    return turns(made) and (made.stance is None or made.stance.spindle is None)
 
 
 def _up(made: Proposal) -> np.ndarray:
@@ -181,6 +229,8 @@ def _objection(one: Way, found: Measured, other: Way, of_other: Measured) -> str
     if now is not None and then is not None and now.value < AS_STRONG * then.value:
         return "weaker"
     time, other_time = _time(one), _time(other)
+    if turns(other.made) and not turns(one.made) and time >= QUICKER * other_time:
+        return "hardly quicker"
     if (
         of_other.time_to_98 > LONG
         and one.made.sonotrode_count <= SEVERAL
@@ -217,7 +267,8 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
 
     def named(one: Way) -> str:
         over = " and turned over" if one.wanted.turned_over else ""
-        return (one.wanted.pose or "evenly exposed").replace("-", " ") + over
+        pose = one.wanted.pose or (TURNING if turns(one.made) else "evenly exposed")
+        return pose.replace("-", " ") + over
 
     texts, trials = [], []
     for one, harm in [(first, ""), *tried]:

@@ -11,12 +11,20 @@ from manifold3d import Manifold, OpType
 from chamberopt.chamber.layout.arbor import find_bores
 from chamberopt.chamber.layout.holder import holder_choices
 from chamberopt.chamber.layout.target import Surface
-from chamberopt.chamber.layout.turning import find_spindle, turning_bore, turning_pose
+from chamberopt.chamber.layout.turning import (
+    SLENDER,
+    Spindle,
+    find_spindle,
+    slenderness,
+    turning_bore,
+    turning_pose,
+)
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.common.errors import InputError
 from chamberopt.geometry.triangles import rotation_matrix
 from tests.chamberopt.chamber.layout.test_arbor import BALL, drum, part_of, ring
+from tests.helpers.turned_parts import stepped_shaft
 
 
 def test_a_ring_of_alike_teeth_turns_about_its_bore() -> None:
@@ -141,3 +149,41 @@ def test_what_cannot_turn_by_its_ends_is_told(body: Manifold, told: str, tmp_pat
 
     with pytest.raises(InputError, match=f"--pose: given turning, but .*{told}"):
         propose(part, Wanted("mm", ball_mm=1.0, pose="turning"), rim)
+
+
+BOTH_SIDES = [(12.0, 40.0), (20.0, 20.0), (12.0, 40.0)]
+
+
+@pytest.mark.parametrize(("length", "sides"), [(40.0, 72), (15.0, 96)])
+def test_a_part_is_slender_by_its_length_unless_its_target_looks_to_one_end(
+    length: float, sides: int
+) -> None:
+    """A collar of 40 mm on a journal: (2 length + 20) / 40. One fillet looks one way."""
+    body = stepped_shaft([(12.0, length), (20.0, 20.0), (12.0, length)], 2.0, sides)
+    mesh, seen = part_of(body)
+    aside = np.hypot(*seen.triangles_center[:, :2].T)
+    fillets = (aside > 12.01) & (aside < 14.0) & (np.abs(seen.face_normals[:, 2]) < 0.999)
+    axis = Spindle(np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    expected = (2.0 * length + 20.0) / 40.0
+    assert slenderness(mesh, fillets, axis) == pytest.approx(expected, rel=1e-3)
+    assert (expected >= SLENDER) == (length > 20.0)
+    one = fillets & (seen.triangles_center[:, 2] < length + 1.0)
+    assert one.any()
+    assert slenderness(mesh, one, axis) == 0.0
+
+
+@pytest.mark.parametrize(("scale", "sides"), [(1.0, 72), (1.5, 96)])
+def test_a_slender_shaft_with_fillets_all_round_turns_first(
+    scale: float, sides: int, tmp_path: Path
+) -> None:
+    body = stepped_shaft([(scale * r, scale * long) for r, long in BOTH_SIDES], 2.0, sides)
+    part = tmp_path / "shaft.stl"
+    part_of(body)[1].export(part)
+    made = propose(part, Wanted("mm", ball_mm=1.0), lambda _: [])
+    assert made.design.effects.part_turn is not None
+    told = made.reasons["part.rotate_deg"]
+    assert "as shops turn a part 2.5 times as long as wide, peened all round" in told
+    assert not made.warnings
+    assert made.tables["holder"]["kind"] == "bore"
+    still = propose(part, Wanted("mm", ball_mm=1.0, may_turn=False), lambda _: [])
+    assert still.design.effects.part_turn is None

@@ -9,18 +9,20 @@ from typing import Any
 import pytest
 import trimesh
 
-from chamberopt.chamber.layout.balls import SizeFit, mostly_serving, serving_sizes
+from chamberopt.chamber.layout.balls import SizeFit, larger_sizes, serving_sizes
 from chamberopt.chamber.propose import proposed_intensity
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_budget import Asked, Measured, propose_budget
 from chamberopt.chamber.propose.proposed_intensity import (
     INTENSITY,
+    LARGER,
     MOST_PILOTS,
     Compared,
     IntensityPilot,
     as_no_wish,
     is_off,
+    larger_balls,
     larger_instead,
     of_ball_sizes,
     propose_intensity,
@@ -100,8 +102,12 @@ def test_balls_that_serve_less_or_jam_or_are_too_many_are_not_tried() -> None:
     fits = [fit(0.5, count=9000), fit(1), fit(1.5, jam=1.5e-3), fit(2), fit(3, served=0.5)]
     fits = [replace(one, suits=one.served > 0.9) for one in fits]
     assert serving_sizes(fits) == [1e-3, 2e-3]
-    more = [fit(2.2, served=0.92, suits=False), fit(2.5, served=0.92, jam=2.5e-3), fits[-1]]
-    assert mostly_serving([*fits[:-1], *more]) == more[:1]
+    more = [fit(2.2, served=0.92, suits=False), fit(2.5, served=0.92, jam=2.5e-3)]
+    far = replace(fit(2.8, served=0.5), suits=False)  # in a wide fillet, which they touch
+    short = [replace(far, touched=0.9), replace(far, fillets=0.9), replace(far, nearly_jam=2.8e-3)]
+    for one in (far, *short):
+        expected = [more[0], far] if one is far else more[:1]
+        assert larger_sizes([*fits[:-1], *more, one]) == expected
 
 
 @dataclass
@@ -190,7 +196,7 @@ def test_larger_balls_that_serve_most_are_taken_only_for_the_intensity(
         ball: propose(plate, replace(wanted, ball_mm=ball), lambda _: []) for ball in (1.0, 1.5)
     }
     small, large = ([one for one in SETTINGS if one.ball_mm == ball] for ball in (1.0, 1.5))
-    possible = Settings(small, large, {1.0: 0.97, 1.5: 0.85})
+    possible = Settings(small, large, {1.0: fit(1, served=0.97), 1.5: fit(1.5, served=0.85)})
     monkeypatch.setattr(
         "chamberopt.chamber.propose.proposed_intensity.settings_of", lambda *_: possible
     )
@@ -205,6 +211,30 @@ def test_larger_balls_that_serve_most_are_taken_only_for_the_intensity(
     reason = made.reasons["shot.diameter_mm"]
     told = "they suit 85% of the target, and 1 mm would suit 97%, with about 0.08 mmA"
     assert (told in reason) == (ball_mm == 1.5)
+
+
+@pytest.mark.parametrize(("served", "text"), [(0.85, "they suit 85%"), (0.04, "they touch 98%")])
+def test_poses_are_compared_with_balls_that_the_intensity_takes(
+    plate: Path, shop: Shop, served: float, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Balls of 1 mm give 0.11 mmA at 40 µm: those of 2 mm are the nearest to the range's middle.
+
+    That these suit little of the target does not count where they touch all of it.
+    """
+    made = propose(plate, Wanted("mm", ball_mm=1.0, shop=shop), lambda _: [])
+    each = {ball: [x for x in SETTINGS if x.ball_mm == ball] for ball in (1.0, 1.5, 2.0, 3.0)}
+    fits = {1.0: fit(1.0), **{ball: fit(ball, served=served) for ball in (1.5, 2.0, 3.0)}}
+    larger = [*each[1.5], *each[2.0], *each[3.0]]
+    possible = Settings(each[1.0], larger, fits)
+    monkeypatch.setattr(
+        "chamberopt.chamber.propose.proposed_intensity.settings_of", lambda *_: possible
+    )
+    found = larger_balls(made, Wanted("mm"), WantedIntensity(0.18, 0.27), 0.11)
+    assert found is not None
+    assert found[0] == 2.0
+    assert found[1].startswith(LARGER)
+    assert text in found[1]
+    assert larger_balls(made, Wanted("mm"), WantedIntensity(0.08, 0.27), 0.11) is None
 
 
 def test_what_is_written_loads_and_has_the_band_beside_the_value(

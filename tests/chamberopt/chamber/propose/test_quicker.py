@@ -25,6 +25,8 @@ from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.load import load_design
 from chamberopt.documents.proposal import proposal_in_words
 from chamberopt.geometry.triangles import rotation_matrix
+from tests.chamberopt.chamber.layout.test_arbor import part_of
+from tests.helpers.turned_parts import stepped_shaft
 
 LEAF = (130.0, 26.0, 6.0)  # mm: length, width and thickness of a bar with a broad side to peen
 
@@ -153,6 +155,51 @@ def test_a_pose_whose_places_are_not_resolved_is_left_open_and_not_called_slower
         assert outcomes["evenly exposed"] == "taken"
         told = to_settle(best.made, ())
         assert any(one.startswith("POSE NOT DECIDED: on edge") for one in told) is is_open
+
+
+@pytest.mark.parametrize(("seconds", "taken"), [(640.0, "on-edge"), (2500.0, None)])
+def test_a_longer_pilot_decides_between_poses(
+    poses: dict[Pose | None, Proposal], seconds: float, taken: Pose | None
+) -> None:
+    """On edge on three sonotrodes: quick enough below half of a time that nobody would run."""
+    of_all = pilots({None: 2024.0, "lying": 1500.0, "on-edge": 512.0})
+
+    def brief(made: Proposal, longest: float) -> Measured:
+        found = of_all(made, longest)
+        return found._replace(places=found.time_to_98 > 600.0)
+
+    longer_ones: list[Proposal] = []
+
+    def longer(made: Proposal, _: float) -> Measured:
+        longer_ones.append(made)
+        return measured(seconds)
+
+    first = Way(poses[None], Wanted("mm"), measured(2024.0))
+    best = propose_quicker(first, of(poses), lambda made: made, brief, longer=longer)
+    assert longer_ones == [poses["on-edge"]]
+    assert best.wanted.pose == taken
+    assert not any("POSE NOT DECIDED" in one for one in to_settle(best.made, ()))
+
+
+def test_a_shaft_that_turns_is_put_on_end_only_where_that_is_clearly_quicker(
+    tmp_path: Path,
+) -> None:
+    body = stepped_shaft([(12.0, 40.0), (20.0, 20.0), (12.0, 40.0)], 2.0)
+    part = tmp_path / "shaft.stl"
+    part_of(body)[1].export(part)
+    made = propose(part, Wanted("mm", ball_mm=1.0), lambda _: [])
+    on_end = propose(part, Wanted("mm", ball_mm=1.0, pose="standing"), lambda _: [])
+    first = Way(made, Wanted("mm"), measured(1000.0))
+    on_end = replace(on_end, warnings=(), jams=())  # what does harm is no choice
+    for time, taken in ((900.0, None), (700.0, "standing")):
+
+        def again(many: Sequence[Wanted]) -> list[Proposal | None]:
+            return [on_end if one.pose == "standing" else None for one in many]
+
+        pilot = measured(time)
+        best = propose_quicker(first, again, turned_over, lambda *_, x=pilot: x)
+        assert best.wanted.pose == taken
+        assert {one.pose for one in best.made.poses} == {"turning", "standing"}
 
 
 def test_a_lying_part_on_which_balls_would_rest_is_tried_turned_over(
