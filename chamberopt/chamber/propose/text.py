@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 
 import tomlkit
 
+from chamberopt.chamber.checks.place_names import PART
+from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.layout.balls import MANY, MISSED
 from chamberopt.chamber.layout.target import Surface
 from chamberopt.chamber.propose.proposal import Proposal
@@ -110,13 +112,23 @@ def to_settle(proposal: Proposal, left_out: Sequence[LeftOut]) -> list[str]:
 
     said = _clauses_of(proposal)
     found = [one for key in sorted(said, key=place) for one in said[key][1]]
-    found += [*_many_balls(proposal), *_quicker_balls(proposal)]
+    found += [*_resting_balls(proposal), *_many_balls(proposal), *_quicker_balls(proposal)]
     for one in left_out:
         keys = " and ".join(f"part.target.{key}" for key in one.keys)
         many = "" if len(one.keys) > 1 else "s"
         leave = f": {keys} in the design leave{many} it out" if keys else ""
         found.append(f"{one_line(one.text)}{leave}")
     return list(dict.fromkeys(found))
+
+
+def _resting_balls(proposal: Proposal) -> Iterator[str]:
+    """Yield that balls would come to rest on the part, and the remedies, as its check tells them.
+
+    They would be lost to the charge, and shield what they lie on.
+    """
+    for one in proposal.warnings:
+        if one.kind is WarningKind.REST and PART in one.about:
+            yield one.message.replace("balls can come to rest", "BALLS CAN COME TO REST", 1)
 
 
 def _many_balls(proposal: Proposal) -> Iterator[str]:

@@ -21,6 +21,7 @@ from chamberopt.chamber.propose.proposed_budget import Measured, TooSlowError
 from chamberopt.chamber.propose.proposed_steps import NOT_OVER, propose_second_pose, turned_over
 from chamberopt.chamber.propose.quicker import NOT_COMPARED, SEVERAL, Way, propose_quicker
 from chamberopt.chamber.propose.text import design_text, to_settle
+from chamberopt.common.errors import InputError
 from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.design.load import load_design
 from chamberopt.documents.proposal import proposal_in_words
@@ -168,6 +169,9 @@ def test_a_longer_pilot_decides_between_poses(
         found = of_all(made, longest)
         return found._replace(places=found.time_to_98 > 600.0)
 
+    def never(_: Proposal) -> Proposal:
+        raise InputError("nothing would hold it")
+
     longer_ones: list[Proposal] = []
 
     def longer(made: Proposal, _: float) -> Measured:
@@ -175,7 +179,7 @@ def test_a_longer_pilot_decides_between_poses(
         return measured(seconds)
 
     first = Way(poses[None], Wanted("mm"), measured(2024.0))
-    best = propose_quicker(first, of(poses), lambda made: made, brief, longer=longer)
+    best = propose_quicker(first, of(poses), never, brief, longer=longer)
     assert longer_ones == [poses["on-edge"]]
     assert best.wanted.pose == taken
     assert not any("POSE NOT DECIDED" in one for one in to_settle(best.made, ()))
@@ -207,6 +211,8 @@ def test_a_lying_part_on_which_balls_would_rest_is_tried_turned_over(
 ) -> None:
     lying = poses["lying"]
     assert rests(lying)
+    matters = to_settle(lying, ())
+    assert any(one.startswith("BALLS CAN COME TO REST on the part, which") for one in matters)
     of_one_pose = pilots({None: 2024.0, "lying": 100.0, "on-edge": 1900.0})
 
     def measure(made: Proposal, longest: float) -> Measured:
@@ -216,6 +222,7 @@ def test_a_lying_part_on_which_balls_would_rest_is_tried_turned_over(
     best = propose_quicker(first, of(poses), turned_over, measure)
     assert best.wanted == Wanted("mm", pose="lying", turned_over=True)
     assert best.found == measured(400.0)
+    assert not any("COME TO REST" in one for one in to_settle(best.made, ()))
     assert "lying and turned over on" in best.made.reasons["part.rotate_deg"]
     assert best.made.reasons[".steps"].startswith("turned over about x after half of the time")
     # What was turned over already is not turned over again.
