@@ -19,8 +19,9 @@ from chamberopt.geometry.triangles import area_vectors, edge_keys, sides_of, uni
 # triangles between them would be slivers.
 NEAR_END = 0.02
 # Edges that a level meets are halved until the distance in their middle is the mean of those at
-# their ends, to this share of the level, or they are this short beside it.
-STRAIGHT, FINE, MOST_HALVINGS = 0.01, 0.1, 20
+# their ends, to this share of the level, or they are this short beside it. Of slivers, whose new
+# edges are as long, a few would be halved for ever.
+STRAIGHT, FINE, MOST_HALVINGS = 0.01, 0.1, 8
 
 
 def facets(vertices: np.ndarray, triangles: np.ndarray) -> Surface:
@@ -131,7 +132,7 @@ def _cut_at_level(
         The surface, how far each of its vertices is beyond the level [m], (m,), and the values,
         linear in between, of its vertices.
     """
-    for _ in range(MOST_HALVINGS):
+    for halvings in range(MOST_HALVINGS + 1):
         ends, edge = _edges(surface.triangles)
         beyond = distance(surface.vertices) - level
         length = np.linalg.norm(np.diff(surface.vertices[ends], axis=1)[:, 0], axis=1)
@@ -140,7 +141,7 @@ def _cut_at_level(
         middle = distance(surface.vertices[ends].mean(axis=1)) - level
         is_bent = np.abs(middle - beyond[ends].mean(axis=1)) > STRAIGHT * level
         share = np.where(meets & is_bent & (length > FINE * level), 0.5, 0.0)
-        if not share.any():
+        if halvings == MOST_HALVINGS or not share.any():
             break
         values = np.concatenate([values, _between(values, ends, share)[share > 0.0]])
         place = _between(surface.vertices, ends, share)

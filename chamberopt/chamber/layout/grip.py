@@ -47,7 +47,12 @@ class Clamp(NamedTuple):
     way: tuple[float, float, float] | None = None
 
 
-def flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) -> Clamp:
+def flat_jaws(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    outside: np.ndarray,
+    least_of_all: float = LEAST_OF_ALL,
+) -> Clamp:
     """Return the largest two flat faces, back to back, that stand out of a chamber.
 
     The text is empty where there are none as large as jaws take.
@@ -55,6 +60,7 @@ def flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) 
     Args:
         vertices, triangles: the posed part [m].
         outside: area of each triangle that may be clamped [m²], (m,).
+        least_of_all: share of all that stands out that both have at least.
     """
     faces = Faces(vertices, triangles, FLAT_DEG)
     free = np.where(
@@ -68,7 +74,7 @@ def flat_jaws(vertices: np.ndarray, triangles: np.ndarray, outside: np.ndarray) 
             pair = [int(one), int(other)]
             area = float(min(free[one], free[other]))
             ways = faces.normal(int(one)), faces.normal(int(other))
-            is_little = free[one] + free[other] < LEAST_OF_ALL * outside.sum()
+            is_little = free[one] + free[other] < least_of_all * outside.sum()
             is_small = is_little or area <= LEAST_JAW
             if is_small or ways[0] @ ways[1] > -np.cos(np.radians(FLAT_DEG)):
                 continue
@@ -136,8 +142,9 @@ def free_outside(chamber: Chamber) -> np.ndarray:
 def outside_clamp(chamber: Chamber) -> Clamp:
     """Return what a part that stands out of its chamber is clamped by there, by its form.
 
-    It is two flat faces that jaws reach far over, or else the largest round. The text is empty if
-    there is neither.
+    It is two flat faces that jaws reach far over, or else the largest round, or else any two flat
+    faces, as the sides of a blade's platform: its airfoil is no place for jaws. The text is empty
+    if there is none of them.
     """
     part, outside = chamber.part, free_outside(chamber)
     jaws = flat_jaws(part.vertices, part.triangles, outside)
@@ -146,7 +153,9 @@ def outside_clamp(chamber: Chamber) -> Clamp:
     axes = {"xyz".index(side[-1]) for side in sides_out(chamber)}
     if radius := _round_end(part.vertices, part.triangles, outside, axes):
         return Clamp(f"a collet or vee blocks round its diameter of {plain(2e3 * radius)} mm")
-    return jaws
+    if jaws.text:
+        return jaws
+    return flat_jaws(part.vertices, part.triangles, outside, least_of_all=0.0)
 
 
 def _round_end(

@@ -96,7 +96,12 @@ def propose_sizes(
         distance = 1e-3 * _up_mm(least * wider)
         height = 1e-3 * _up_mm(distance + below + above)
         if through and triangles is not None:
-            ends = distance + below + CLOSEST * above, min(height + above, distance + top - SEEN)
+            least = distance + below + CLOSEST * above
+            ends = least, min(height + above, distance + top - SEEN)
+            if _ends_under_ledge(vertices, triangles, below):  # no ball gets over it
+                off = 2e-3 * iso_2768_m(1e3 * (distance + below))
+                height = least = 1e-3 * _up_mm(distance + below + off)
+                ends = least, ends[1]
             height = _off_ledges(vertices, triangles, distance, height, ends, ball)
         return distance, height
 
@@ -150,6 +155,17 @@ def _ledges(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np
     around = 2.0 * float(np.ptp(vertices[:, :2], axis=0).sum())
     keys = keys[np.bincount(row, length, len(keys)) > MUCH * around]
     return ONE_LEVEL * np.floor(0.5 * keys), keys % 2.0 == 1.0
+
+
+def _ends_under_ledge(vertices: np.ndarray, triangles: np.ndarray, top: float) -> bool:
+    """Return whether a target ends at a level face that looks down, as under a platform.
+
+    Args:
+        vertices, triangles: the turned part, with its lowest point at z = 0 [m].
+        top: height of the target's highest point [m].
+    """
+    levels, up = _ledges(vertices, triangles)
+    return bool((np.abs(levels[~up] - top) < ONE_LEVEL).any())
 
 
 def _off_ledges(
