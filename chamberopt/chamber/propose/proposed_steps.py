@@ -263,10 +263,10 @@ def with_finer_balls(
         finer = _with_shot(coarse, finer_mm)
         fine, most = fit_sizes(finer.chamber.part, [1e-3 * finer_mm, 1e-3 * coarse_mm])
         shares = f"{coarse_mm:g} mm serve {most.served:.0%}, {finer_mm:g} mm {fine.served:.0%}"
-        if reaches(most):
-            return None, ""
         for_fillets = fine.fillets > most.fillets + MISSED_FILLETS
         gain = fine.served - most.served
+        if most.served < MOSTLY and reaches(most):
+            return None, ""
         if most.served < MOSTLY:
             return None, f"the larger ones suit too little ({shares})"
         if not (gain > AS_GOOD or for_fillets):
