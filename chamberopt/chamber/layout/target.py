@@ -70,6 +70,7 @@ SHARPER_DEG = 45.0, 60.0  # of edges, where those of CREASE_DEG part a coarse me
 COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 100
 BY_PROGRAM = re.compile(r"(?:created|exported|generated|written)[\s_-]+(?:by|from|with)\b", re.I)
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
+MOST_BESIDE_MM = 2.0  # of what goes on from a fillet, by heart: as wide as its radius below that
 FILLETS = re.compile("fillets of ", re.I)
 FACE = re.compile(r"face (\d+)", re.I)
 FLAT_DEG = 5.0  # largest angle in a face that is flat
@@ -346,7 +347,7 @@ def _fillets(mesh: PartMesh) -> list[Surface]:
         count = f"{len(own)} faces, " if len(own) > 1 else ""
         name, marked = f"fillets of {1e3 / widest:.3g} mm", np.isin(faces.of_triangle, own)
         text = count + area_in_mm2(area)
-        beside_mm = max(0.5 * round(2e3 / widest), 0.5)
+        beside_mm = min(max(0.5 * round(2e3 / widest), 0.5), MOST_BESIDE_MM)
         one = Surface(name, {"faces": keys}, marked, text, raises_stress=True, beside_mm=beside_mm)
         found.append((area, one))
     return [one for _, one in sorted(found, key=lambda pair: -pair[0])]
@@ -468,7 +469,7 @@ def _joined(chosen: Sequence[Surface], reason: str) -> Target:
         keys["beside_mm"] = beside_mm = max(one.beside_mm for one in chosen)
         where = "the toes, as wide as the leg of the weld by rule of thumb, as cracks begin there"
         if FILLETS.match(chosen[0].name):
-            where = "the fillets, as wide as their radius by rule of thumb, so that it runs out"
+            where = "the fillets by rule of thumb, so that it runs out"
         reason = (
             f"with {beside_mm:g} mm of the faces beside {where} (no source read, "
             f"part.target.beside_mm changes it); {reason}"

@@ -369,7 +369,7 @@ def test_names_cannot_write_into_the_design(tmp_path: Path) -> None:
     reasons = {"part.target": target.reason}
     design = SimpleNamespace(in_steps=FEW_BALLS)
     made = SimpleNamespace(
-        tables=tables, reasons=reasons, known=known, design=design, trials=(), poses=()
+        tables=tables, reasons=reasons, known=known, design=design, trials=(), poses=(), warnings=()
     )
     text = design_text(made, tmp_path)
     written = {"part": {"mesh": f"{bad}.stl", "target": {"surface": [bad]}}}

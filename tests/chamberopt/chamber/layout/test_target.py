@@ -286,15 +286,15 @@ def test_a_target_takes_a_strip_beside_its_hollow_edges(tmp_path: Path, wide: fl
 def test_a_fillet_is_peened_with_a_strip_beside_it(
     tmp_path: Path, fillet: float, sides: int
 ) -> None:
-    """As wide as its radius on the journal and on the shoulder, and not over the shoulder's edge.
+    """By its radius, at most 2 mm, on journal and shoulder, and not over the shoulder's edge.
 
-    The shoulder goes on beyond the fillet by less than its radius: all of it is taken.
+    The shoulder goes on beyond the fillet by less: all of it is taken.
     """
     journal, collar = 15.0, 15.0 + 1.6 * fillet
     body = stepped_shaft([(journal, 60.0), (collar, 30.0)], fillet, sides)
     part_of(body)[1].export(tmp_path / "shaft.stl")
     made = propose(tmp_path / "shaft.stl", Wanted(unit="mm", ball_mm=1.0), lambda _: ())
-    assert made.tables["part.target"]["beside_mm"] == fillet
+    assert made.tables["part.target"]["beside_mm"] == 2.0
     assert "so that it runs out" in made.reasons["part.target"]
     design = made.design.changed({"part.target.reachable": False})
     part = posed_part(design)[0]
@@ -302,6 +302,6 @@ def test_a_fillet_is_peened_with_a_strip_beside_it(
     middle = journal + fillet - 2.0 / np.pi * fillet  # of the arc, by Pappus
     round_ = 2.0 * np.pi * middle * 0.5 * np.pi * fillet
     shoulder = np.pi * (collar**2 - (journal + fillet) ** 2)
-    strip = 2.0 * np.pi * journal * fillet
+    strip = 2.0 * np.pi * journal * 2.0
     assert area == pytest.approx(round_ + shoulder + strip, rel=0.03)
     assert trimesh.Trimesh(part.vertices, part.triangles, process=False).is_watertight
