@@ -4,9 +4,9 @@ Balls come from below. So the exposure of a point of the target is (1 + cos a) /
 angle between its normal and the way down: 1 where the target faces the sonotrode, 1/2 on upright
 walls, 0 where it faces up. The pose has the highest mean minus standard deviation of the exposure
 over the target's area, as the objective of a study has of coverage (coverage/metrics.py). A shaft
-should therefore stand upright: if it lies, it is hit below and not above. This rule gives a first
-pose and is no simulation. A pose that a fixture gives more simply has an advantage: it is taken
-where it is worse by less.
+that does not turn should therefore stand: if it lies, it is hit below and not above. This rule
+gives a first pose and is no simulation. A pose that a fixture gives more simply has an advantage:
+it is taken where it is worse by less.
 """
 
 from __future__ import annotations

@@ -84,6 +84,7 @@ def test_both_jaws_together_close_on_enough_of_what_stands_out(share: float, is_
     outside = np.where(across, share / 2.0, np.where(above, (1.0 - 2.0 * share) / 2.0, 0.0))
     jaws = flat_jaws(1e-3 * bar.vertices, bar.faces, 0.015 * outside)
     assert bool(jaws.text) == is_held
+    assert flat_jaws(1e-3 * bar.vertices, bar.faces, 0.015 * outside, least_of_all=0.0).text
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

@@ -305,3 +305,18 @@ def test_a_fillet_is_peened_with_a_strip_beside_it(
     strip = 2.0 * np.pi * journal * 2.0
     assert area == pytest.approx(round_ + shoulder + strip, rel=0.03)
     assert trimesh.Trimesh(part.vertices, part.triangles, process=False).is_watertight
+
+
+@pytest.mark.parametrize(("thick", "ball_mm"), [(5.0, 0.8), (8.0, 2.0)])
+def test_a_ceiling_lies_just_above_a_platform_under_which_the_target_ends(
+    thick: float, ball_mm: float
+) -> None:
+    """Twice its tolerance of 0.2 mm (ISO 2768-m up to 30 mm), in whole mm: the platform is out."""
+    body = Manifold.cube((20, 40, 16)).translate([-10, -20, 0])
+    body += Manifold.cube((36, 54, thick)).translate([-18, -27, 16])
+    body += Manifold.cube((4, 40, 80)).translate([-2, -20, 16])
+    under = sized(body, 16.0, ball_mm)
+    assert under.through_ceiling
+    assert 0.4 <= 1e3 * (under.height - under.distance) - 16.0 <= 1.0
+    below = sized(body, 12.0, ball_mm)  # its room goes on above it
+    assert 1e3 * (below.height - below.distance) >= 12.0 + 0.6 * 5.0 * ball_mm - 1e-6
