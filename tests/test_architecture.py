@@ -31,7 +31,7 @@ ORDER = {
     "chamberopt/chamber": (
         "replica_seed bores_and_deflectors thin_part part fixture+reach+largest_ball build "
         "dimensionless "
-        "flexure+scene analytic shop checks layout propose"
+        "flexure+scene analytic shop+matters checks layout propose"
     ),
     "chamberopt/coverage": "dents part_impacts+metrics field coverage_from_impacts "
     "true_densities percentile coverage_intervals strength strength_intervals stress_law "

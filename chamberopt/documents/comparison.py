@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from chamberopt.common.estimate import CONFIDENCE, Estimate
 from chamberopt.common.key_words import title_with_unit
@@ -30,14 +31,29 @@ def comparison_end(comparison: Comparison, verbose: bool) -> list[Table | str]:
     Args:
         verbose: all figures follow, by their names in files, with what would prove a difference.
     """
-    *content, legend = summary(comparison)
+    told = summary(comparison)
+    content = [*told.answers, *told.doubts, "", told.table, ""]
     if verbose:
         return [*content, *comparison_lines(comparison)]
-    return [*content, f"({legend} --verbose and compare.txt have every figure.)"]
+    return [*content, f"({told.legend} --verbose and compare.txt have every figure.)"]
 
 
-def summary(comparison: Comparison) -> list[Table | str]:
-    """Return a sentence for each later candidate, a table of the main figures, and its legend."""
+class Summary(NamedTuple):
+    """A comparison in short.
+
+    answers: a sentence for each later candidate, and that no number differs if so.
+    doubts: warnings of balls that jam, or of a shot that had not settled, of each result.
+    table, legend: the main figures, and what their signs are.
+    """
+
+    answers: list[str]
+    doubts: list[str]
+    table: Table
+    legend: str
+
+
+def summary(comparison: Comparison) -> Summary:
+    """Return a comparison in short."""
     first, *later = comparison.labels
     goal = comparison.results[0].objective_name
     goal = goal if goal in comparison.metrics else ""  # results of different objectives share none
@@ -46,7 +62,6 @@ def summary(comparison: Comparison) -> list[Table | str]:
     sentences = [_sentence(comparison, *shown[0], k) for k in range(len(later))] if shown else []
     if not comparison.parameters:
         sentences.append("No number of the designs differs: they were simulated again.")
-    sentences += doubts(comparison)
     several = len(later) > 1
     rows = [
         [title_with_unit(name), *map(_shown, values), *[""] * (not several)]
@@ -61,13 +76,9 @@ def summary(comparison: Comparison) -> list[Table | str]:
         rows.append([label.with_unit, label.number(one), *cells])
     heads = ["", *comparison.labels, *[f"{later[0]} - {first}"] * (not several)]
     legend = f"±: 95 % intervals. *: differs from {first} by more than noise."
-    return [*sentences, "", Table("", heads, rows, numbers=False), "", legend]
-
-
-def doubts(comparison: Comparison) -> list[str]:
-    """Return the warnings of balls that jam, or of a shot that had not settled, of each result."""
     named = zip(comparison.labels, comparison.results, strict=True)
-    return [f"{name}: {line.text}" for name, one in named for line in shot_lines(one)]
+    doubts = [f"{name}: {line.text}" for name, one in named for line in shot_lines(one)]
+    return Summary(sentences, doubts, Table("", heads, rows, numbers=False), legend)
 
 
 def _sentence(comparison: Comparison, name: str, label: Label, k: int) -> str:

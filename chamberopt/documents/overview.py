@@ -11,7 +11,7 @@ import numpy as np
 from chamberopt.chamber.checks.check import notes
 from chamberopt.common.key_words import title_with_unit
 from chamberopt.documents.answer import answer, answer_lines
-from chamberopt.documents.comparison import doubts, summary
+from chamberopt.documents.comparison import summary
 from chamberopt.documents.coverage import figures, figures_table
 from chamberopt.documents.document import Block, Fold, Items, Section, Sentence, Table, values
 from chamberopt.documents.report import limits_of_intervals, notes_of
@@ -103,12 +103,11 @@ def sweep_overview(sweep: SweepResult) -> Section:
 
 def comparison_overview(comparison: Comparison) -> Section:
     """Return the overview of a comparison: a sentence for each candidate, and the main figures."""
-    title, lines = f"Comparison with {comparison.labels[0]}", summary(comparison)
-    end, warned = lines.index(""), doubts(comparison)
-    answers = [
-        Sentence(str(one), "warning" if one in warned else "sentence") for one in lines[:end]
-    ]
-    return Section(title, [*answers, *_blocks(lines[end:])], is_answer=True)
+    told = summary(comparison)
+    answers = [Sentence(one, "sentence") for one in told.answers]
+    doubts = [Sentence(one, "warning") for one in told.doubts]
+    content = [*answers, *doubts, told.table, Sentence(told.legend)]
+    return Section(f"Comparison with {comparison.labels[0]}", content, is_answer=True)
 
 
 def _blocks(lines: Sequence[Table | str]) -> list[Block]:

@@ -1,8 +1,7 @@
 """A proposal of `new` in words: what is proposed and why, and what is to be settled first.
 
-The reasons of a proposal's values say what has to be settled in clauses that begin with words in
-capitals, such as NOT MASKED or LONG. They are one list, here and in the design file's `to_settle`;
-all other clauses stand beside the values.
+The reasons of a proposal's values have clauses that are matters (`chamber/matters.py`). They are
+one list, here and in the design file's `to_settle`; all other clauses stand beside the values.
 """
 
 from __future__ import annotations
@@ -12,15 +11,14 @@ import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.checks.fillets import OF_FILLET, OF_SLOT
 from chamberopt.chamber.layout.target import area_in_mm2
-from chamberopt.chamber.propose.placed_proposal import START
-from chamberopt.chamber.propose.proposed_budget import OF_TIME
+from chamberopt.chamber.matters import Matter, MatterKind
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
-from chamberopt.chamber.propose.quicker import TRIED
-from chamberopt.chamber.propose.text import TO_SETTLE, clauses, to_settle
+from chamberopt.chamber.propose.text import clauses, to_settle
 from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import in_words
 from chamberopt.common.number_text import NO_BREAK, held_together, plain, rounded
@@ -58,19 +56,6 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Matter:
-    """What is to be settled before a proposal is built.
-
-    Attributes:
-        mark: its words in capitals, with which its reason in the design file begins; or "".
-        text: the rest of its sentence, from the first character after the mark.
-    """
-
-    mark: str
-    text: str
-
-
-@dataclass(frozen=True)
 class Choice:
     """A surface that could be peened instead.
 
@@ -96,7 +81,7 @@ class ProposalInWords:
     Attributes:
         sentence: what is proposed.
         rows: the proposed values with their reasons, in the order in which a shop asks.
-        matters: what is to be settled before it is built.
+        matters: what somebody has to look at, the most urgent first.
         choices: surfaces to choose a target from.
         poses: poses, the quickest first, where pilots compared them.
         trials: balls of several sizes, where pilots compared them.
@@ -122,7 +107,6 @@ def proposal_in_words(made: Proposal, left_out: Sequence[LeftOut]) -> ProposalIn
         for key in keys:
             reason = one_line(made.reasons.get(key, ""))  # its beginning may be the row's value
             why, _ = clauses(re.sub(f"^{re.escape(value)}[:;] ", "", reason))
-            why = [one for one in why if not (made.poses and one.startswith(TRIED))]
             if why and why != [value]:
                 of = f"{in_words(key.rpartition('.')[2])}: " if key.endswith("_mm") else ""
                 reasons.append(f"{of}{'; '.join(why)}")
@@ -133,7 +117,7 @@ def proposal_in_words(made: Proposal, left_out: Sequence[LeftOut]) -> ProposalIn
         tuple(rows),
         _poses(made) if made.poses else None,
         _trials(made) if made.trials else None,
-        tuple(matter_of(text) for text in to_settle(made, left_out)),
+        tuple(map(as_sentence, to_settle(made, left_out))),
         tuple(_choice(_as_simulated(one, made), one.name == target) for one in made.known),
     )
 
@@ -152,22 +136,21 @@ def proposal_lines(told: ProposalInWords, verbose: bool) -> list[Table | str]:
                 lines += wrapped(f"{'':{INDENT}}{reason}", INDENT)
     for table in filter(None, (told.poses, told.trials)):
         lines += ["", *wrapped(f"{table.caption}:", 0), table]
-    if told.matters:
-        lines += ["", "To be settled before it is built:"]
-        for number, matter in enumerate(told.matters, 1):
-            lines += wrapped(f"{number:2}. {matter.mark}{matter.text}", 4)
+    numbered = enumerate(told.matters, 1)
+    for urgency, matters in groupby(numbered, lambda one: one[1].urgency):
+        lines += ["", f"{urgency.in_words}:"]
+        for number, matter in matters:
+            lines += wrapped(f"{number:2}. {matter.sentence}", 4)
     if told.trials or any("suit" in reason for row in told.rows for reason in row.reasons):
         lines += ["", *wrapped(SUITS, 0)]
     most = len(told.choices) if verbose else MOST_LISTED
     return [*lines, "", *choice_lines(told.choices, most)]
 
 
-def matter_of(text: str) -> Matter:
-    """Return what is to be settled, as a sentence after the words that mark it."""
-    sentence = _as_sentence(one_line(text))
-    found = TO_SETTLE.match(sentence)
-    mark = found[0] if found else ""
-    return Matter(mark, sentence[len(mark) :])
+def as_sentence(matter: Matter) -> Matter:
+    """Return a matter as a whole sentence in one line."""
+    text = one_line(matter.text)
+    return replace(matter, text=text if text.endswith(".") else f"{text}.")
 
 
 def choices_of(known: Sequence[Surface]) -> list[Choice]:
@@ -269,9 +252,11 @@ def _time(made: Proposal) -> str:
 
     It is one too where a pilot did not tell single places apart.
     """
-    reason = made.reasons.get("process.treatment_time_s", "")
+    _, matters = clauses(made.reasons.get("process.treatment_time_s", ""))
     time = time_in_words(made.design.process.treatment_time)
-    return f"{time} (a start)" if reason.startswith(START) or OF_TIME[1] in reason else time
+    starts = (MatterKind.NOT_MEASURED, MatterKind.TIME_NOT_RESOLVED)
+    is_start = any(one.kind in starts for one in matters)
+    return f"{time} (a start)" if is_start else time
 
 
 def _target(made: Proposal) -> str:
@@ -409,10 +394,6 @@ def _numbers(table: Mapping[str, object]) -> Iterator[tuple[str, float]]:
     for key, value in table.items():
         if isinstance(value, int | float) and not isinstance(value, bool) and key.endswith("_mm"):
             yield key, float(value)
-
-
-def _as_sentence(text: str) -> str:
-    return text if text.endswith(".") else f"{text}."
 
 
 def wrapped(text: str, indent: int) -> list[str]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.checks.check import matters
-from chamberopt.chamber.propose.proposed_budget import OF_TIME, ROUGH
+from chamberopt.chamber.matters import OF_TIME, Matter, matter_of
+from chamberopt.chamber.propose.proposed_budget import ROUGH
 from chamberopt.common.files import read_file
 from chamberopt.common.key_words import title_with_unit
 from chamberopt.common.number_text import estimate_text, typeset
@@ -26,7 +28,7 @@ from chamberopt.documents.document import (
     TextFile,
     values,
 )
-from chamberopt.documents.proposal import matter_of
+from chamberopt.documents.proposal import as_sentence
 from chamberopt.documents.ranges import groups_text, range_section
 from chamberopt.documents.stress import stress_section
 from chamberopt.documents.study import (
@@ -111,7 +113,7 @@ def report(result: Result) -> Document:
     sections = (
         question_section(result),
         answer_section(result, start),
-        _to_settle(result),
+        *_matters(result),
         Section("The best chamber" if study else "The chamber", [PartView([scene])]),
         front_section(study) if study else None,
         search_section(result, trials) if study else None,
@@ -299,36 +301,37 @@ def _effect_text(name: str, value: object) -> str:
     return "on" if value else "off"
 
 
-def open_matters(result: Result) -> list[str]:
-    """Return what is to be settled with the design, but for a time that the result now knows."""
+def open_matters(result: Result) -> list[Matter]:
+    """Return the matters of a result's design, the most urgent first.
+
+    A time that the result now knows is none.
+    """
     time = result.metrics.get("time_to_98_s")
     is_known = time is not None and time.half_width <= ROUGH * time.value
-    return [one for one in result.design.to_settle if not (is_known and one.startswith(OF_TIME))]
+    found = [as_sentence(matter_of(one)) for one in result.design.to_settle]
+    found = [one for one in found if not (is_known and one.kind in OF_TIME)]
+    return sorted(found, key=lambda one: one.urgency)
 
 
-def open_warnings(result: Result) -> list[str]:
-    """Return the warnings of a result, but for matters that it settles itself."""
-    open_ = open_matters(result)
-    left_out = zip(result.design.to_settle, matters(result.design), strict=True)
-    settled = {warning for matter, warning in left_out if matter not in open_}
-    return [one for one in result.record.warnings or () if one not in settled]
+def own_warnings(result: Result) -> list[str]:
+    """Return the warnings of a result's design without its matters, which have their own list."""
+    of_matters = {*matters(result.design)}
+    return [one for one in result.record.warnings or () if one not in of_matters]
 
 
-def _to_settle(result: Result) -> Section | None:
-    """Return what is to be settled with the design before its chamber is built, if anything is."""
-    found = map(matter_of, open_matters(result))
-    texts = [keys_in_words(f"{one.mark.capitalize()}{one.text}") for one in found]
-    return Section("To be settled before it is built", [Items(texts)]) if texts else None
+def _matters(result: Result) -> Iterator[Section]:
+    """Yield a section with the matters of each urgency of which there are some."""
+    for urgency, found in groupby(open_matters(result), lambda one: one.urgency):
+        texts = [keys_in_words(f"{one.mark.capitalize()}{one.text}") for one in found]
+        yield Section(urgency.in_words, [Items(texts)])
 
 
 def notes_section(result: Result) -> Section:
     """Return the warnings of the check and the notes on a result."""
-    warnings, settled = result.record.warnings, {*matters(result.design)}
-    told = (text for text in warnings or () if text not in settled)  # those have their own section
-    notes = [*(f"Warning: {text}" for text in told), *notes_of(result)]
+    notes = [*(f"Warning: {text}" for text in own_warnings(result)), *notes_of(result)]
     notes = [keys_in_words(text) for text in notes]
     content = [Sentence(note, "warning") for note in notes]
-    if warnings is None:
+    if result.record.warnings is None:
         text = "The design was not checked; “chamberopt check” lists its warnings."
         content.append(Sentence(text))
     elif not notes:

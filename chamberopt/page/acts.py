@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from chamberopt.chamber.matters import matter_of
 from chamberopt.chamber.part import preview_part
 from chamberopt.chamber.propose.text import GOALS, study_of_design
 from chamberopt.common.errors import InputError
@@ -35,7 +36,7 @@ from chamberopt.documents.answer import on_average, stopped_text
 from chamberopt.documents.comparison import after_shorter_time
 from chamberopt.documents.document import Fold, Section, Sentence
 from chamberopt.documents.overview import comparison_overview
-from chamberopt.documents.proposal import matter_of
+from chamberopt.documents.proposal import as_sentence
 from chamberopt.documents.report import answer_section, notes_section
 from chamberopt.documents.study import aim_in_words
 from chamberopt.documents.wanted import times_longer
@@ -596,12 +597,16 @@ def _told_of(file: EditedFile) -> dict[str, object]:
         "to_settle": [
             {
                 "text": one,
+                "urgency": matter.urgency.in_words,
                 "mark": matter.mark.capitalize(),
                 "words": on_page(matter.text),
                 "takes": _taken(design, one),
                 "meets": names_met(matter.text),
             }
-            for one, matter in zip(design.to_settle, map(matter_of, design.to_settle), strict=True)
+            for matter, one in sorted(
+                ((as_sentence(matter_of(one)), one) for one in design.to_settle),
+                key=lambda both: both[0].urgency,
+            )
         ],
     }
 

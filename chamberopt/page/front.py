@@ -11,6 +11,7 @@ from typing import Any, get_args
 from chamberopt.chamber.layout.pose import Pose
 from chamberopt.chamber.layout.sizes import SHAPES
 from chamberopt.chamber.layout.target import named_surfaces
+from chamberopt.chamber.matters import Matter, MatterKind
 from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.shop import load_shop
 from chamberopt.common.errors import InputError
@@ -252,15 +253,22 @@ def _on_page(answer: Any) -> dict[str, object] | None:
         ],
         "matters": [
             {
-                "mark": one["mark"].capitalize(),
-                "text": on_page(one["text"]),
-                "balls": balls_named(one["text"]),
+                "urgency": one.urgency.in_words,
+                "mark": one.mark.capitalize(),
+                "text": on_page(one.text),
+                "balls": balls_named(one.text),
             }
-            for one in answer["matters"]
+            for one in _matters(answer)
         ],
         "choices": answer["choices"],
         "tables": [one for one in (answer["poses"], answer["trials"]) if one],
     }
+
+
+def _matters(answer: Any) -> Iterator[Matter]:
+    """Yield the matters of a proposal that `new` has answered."""
+    for one in answer["matters"]:
+        yield Matter(one["kind"] and MatterKind(one["kind"]), one["text"])
 
 
 def _hint(given: str, allowed: Sequence[str]) -> str:

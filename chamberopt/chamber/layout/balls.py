@@ -20,6 +20,7 @@ from chamberopt.chamber.checks.fillets import AS_DRAWN, OF_FILLET, OF_SLOT, inne
 from chamberopt.chamber.checks.jams import JAM_BAND, MAX_COSINE, MIN_AREA
 from chamberopt.chamber.checks.usual import DEEPEST
 from chamberopt.chamber.largest_ball import spread_points
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.reach import TOLERATED_OVERLAP
 from chamberopt.geometry.thickness import depth_below
@@ -253,7 +254,7 @@ def propose_ball(fits: Sequence[SizeFit]) -> tuple[float, str]:
     if blunt and blunt[0].fillets < best.fillets - MISSED_FILLETS:
         text += "; larger ones do not get into its fillets, where parts fail"
     if best.jam:
-        text += f"; BALLS JAM in gaps of {1e3 * best.jam:.4g} mm, as every size does"
+        text += f"; {MatterKind.JAM} in gaps of {1e3 * best.jam:.4g} mm, as every size does"
     elif jammed := [number for number, one in enumerate(fits) if one.jam]:
         first, last = fits[jammed[0]], fits[jammed[-1]]
         listed = ", ".join(_mm(fits[number]) for number in jammed)
@@ -268,11 +269,11 @@ def _of_play(one: SizeFit) -> str:
     gap, ball = f"{1e3 * one.nearly_jam:.2g} mm", 1e3 * one.diameter
     if one.play > 0.0:
         return (
-            f"PLAY OF {1e3 * one.play:.2g} mm IN A GAP of {gap}: balls jam where it is narrower "
-            f"than {JAM_BAND[1] * ball:.3g} mm: measure it"
+            f"{MatterKind.PLAY} {1e3 * one.play:.2g} mm IN A GAP of {gap}: balls jam where it is "
+            f"narrower than {JAM_BAND[1] * ball:.3g} mm: measure it"
         )
     return (
-        f"BALLS MAY JAM IN A GAP of {gap}, where it is wider than {JAM_BAND[0] * ball:.3g} mm: "
+        f"{MatterKind.MAY_JAM} of {gap}, where it is wider than {JAM_BAND[0] * ball:.3g} mm: "
         "measure it"
     )
 
@@ -309,7 +310,7 @@ def _best_of(free: Sequence[SizeFit], fits: Sequence[SizeFit]) -> tuple[SizeFit,
         best = as_good
         shown = sorted({*fits[:: max(1, len(fits) // MOST_LISTED)], best}, key=lambda x: x.diameter)
         shares = ", ".join(f"{_mm(one)} {one.served:.0%}" for one in shown)
-        text = f"NO SIZE SUITS ALL (fillets of 2, slots of 4 diameters); of the target: {shares}"
+        text = f"{MatterKind.NO_SIZE} (fillets of 2, slots of 4 diameters); of the target: {shares}"
     return best, text
 
 

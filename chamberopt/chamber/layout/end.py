@@ -26,6 +26,7 @@ import numpy as np
 from chamberopt.chamber.layout.pose import Turns, turns_down
 from chamberopt.chamber.layout.sizes import Sizes, middle_in_plan
 from chamberopt.chamber.layout.target import Keys, Target
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.design.shapes.outlines import area_inside
 from chamberopt.geometry.cut import cut_at_box, facets, with_beside
 from chamberopt.geometry.heights import lowest_over
@@ -192,7 +193,7 @@ def held_end(mesh: PartMesh, target: Target, turns: Turns, of_any: bool = False)
     keys = {**target.keys, "box_mm": box, "cut": True}
     bare = float(area[of_end & target.triangles].sum() / area[target.triangles].sum())
     reason = (
-        f"{target.reason}; AN END IS LEFT OUT, {share:.0%} of its length, {bare:.0%} of the "
+        f"{target.reason}; {MatterKind.END_LEFT}, {share:.0%} of its length, {bare:.0%} of the "
         "target, to hold it by, in a "
         "soft lining where it is a finished seat: accept it, or peen it in a second setup, end for "
         "end"
@@ -295,7 +296,7 @@ def strip(mesh: PartMesh, target: Target, turns: Turns, longest: float) -> HeldE
     is_even = count == 2 and strips.are_alike
     over = ", or turned end for end if its halves are alike" if is_even else ""
     reason = (
-        f"{target.reason}; A STRIP AT A TIME, in {count} settings: it is moved along the "
+        f"{target.reason}; {MatterKind.STRIPS}, in {count} settings: it is moved along the "
         f"{'xyz'[axis]} of its file by {1e3 * pitch:.3g} mm of {1e3 * extent:.3g} mm between them"
         f"{over}, and each takes its treatment time (setting_N.toml); where the part ends, a plate "
         "closes the chamber"

@@ -25,6 +25,7 @@ import numpy as np
 
 from chamberopt.chamber.layout.end import Strips
 from chamberopt.chamber.layout.sizes import Sizes
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.shop import Shop, Stand
 from chamberopt.common.errors import InputError
 from chamberopt.design.fixture import slit_in_words
@@ -49,10 +50,10 @@ WHOLE, WHOLE_OF_BLOCKS = 1.25, 1.1
 def of_blocks(ball: float) -> str:
     """Return what is said of a floor of several sonotrodes, for a diameter of the balls [m]."""
     return (
-        "LARGER THAN ONE SONOTRODE: the floor is several side by side, which must vibrate in phase "
-        "and alike: settle with their maker how they are driven and tuned for that, and if they "
-        "cannot be, peen the target a length at a time over one of them (--shop, of a file with "
-        "pieces = 1); gaps "
+        f"{MatterKind.SEVERAL_SONOTRODES}: the floor is several side by side, which must vibrate "
+        "in phase and alike: settle with their maker how they are driven and tuned for that, and "
+        "if they cannot be, peen the target a length at a time over one of them (--shop, of a file "
+        "with pieces = 1); gaps "
         f"between them of {slit_in_words(1e3 * ball)}, half a ball"
     )
 
@@ -136,7 +137,7 @@ def floor_on_sonotrode(
     if not may_exceed:
         raise InputError(f"--shop: {text}, also with walls that lean by {STEEPEST:g}°: {ways}")
     usual = "usual ones: chamberopt shop --example; give yours by --shop"
-    reason = f"LARGER THAN USUAL SONOTRODES, simulated as one face: {ways}; {usual}"
+    reason = f"{MatterKind.WIDE_FLOOR}, simulated as one face: {ways}; {usual}"
     return Floor(sizes, stand, reason, math.inf, math.prod(sides))
 
 
@@ -224,7 +225,7 @@ def _over_the_face(sizes: Sizes, shop: Shop, stand: Stand) -> Floor:
         wide = " x ".join(f"{one + 2.0 * shop.clearance_mm:g}" for one in sides)
         are = "is" if face.count == 1 else "and the gaps between the blocks are"
         return (
-            f"BUILD IT {wide} mm wide, within the limits on the sheet: the slit of "
+            f"{MatterKind.BUILD_WIDER} {wide} mm wide, within the limits on the sheet: the slit of "
             f"{shop.clearance_mm:g} mm on each side of {name} {are} not simulated"
         )
 

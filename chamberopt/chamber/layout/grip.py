@@ -10,6 +10,7 @@ import numpy as np
 
 from chamberopt.chamber.layout.end import DEEP
 from chamberopt.chamber.layout.target import area_in_mm2, nearest_axis
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.cut import cut_at_box, facets
 from chamberopt.geometry.faces import Faces
@@ -93,8 +94,8 @@ def flat_jaws(
                 for way, face in zip(ways, pair, strict=True)
             )
             if is_shallow:
-                text += f"; SHALLOW GRIP, {1e3 * depth:.2g} mm of these faces: jaws need "
-                text += f"{1e3 * DEEP:g} mm"
+                is_told = f"{1e3 * depth:.2g} mm of these faces: jaws need {1e3 * DEEP:g} mm"
+                text += f"; {MatterKind.SHALLOW_GRIP}, {is_told}"
             x, y, z = ways[0].tolist()
             found = Clamp(text, is_shallow, (x, y, z))
     return found
@@ -214,9 +215,9 @@ class ThinGrip(NamedTuple):
     def text(self) -> str:
         """What is to be settled."""
         return (
-            f"THIN GRIP, on {1e3 * self.metal:.2g} mm of metal, with the centre of mass "
-            f"{1e3 * self.overhang:.2g} mm beyond the jaws: hold the part by another end, or take "
-            "a target that leaves one free (--target)"
+            f"{MatterKind.THIN_GRIP}, on {1e3 * self.metal:.2g} mm of metal, with the centre of "
+            f"mass {1e3 * self.overhang:.2g} mm beyond the jaws: hold the part by another end, or "
+            "take a target that leaves one free (--target)"
         )
 
 

@@ -25,6 +25,7 @@ from chamberopt.chamber.fixture import OF_FACE
 from chamberopt.chamber.layout.arbor import Bore, arbor_through, carries
 from chamberopt.chamber.layout.end import UPRIGHT, box_beyond
 from chamberopt.chamber.layout.grip import FLAT_DEG, flat_jaws, gripped, thin_grip
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.outline import (
@@ -51,8 +52,8 @@ WIDER, SHORTEST, LONGEST = 2.0, 0.25, 0.4
 # An end narrows if its outer TIP, a share of the grip, is slimmer than STRAIGHT of the whole grip.
 TIP, STRAIGHT = 0.1, 0.8
 PINS = "expanding pins, drawn from behind, in its"
-NOT_FIXED = "NO HOLE FOR SCREWS: say what holds the part to it, such as a clamp"
-POTTED = "NO STRAIGHT END TO CLAMP: give jaws its form, or cast it into the block with polyurethane"
+NOT_FIXED = f"{MatterKind.NOT_FIXED}: say what holds the part to it, such as a clamp"
+POTTED = f"{MatterKind.POTTED}: give jaws its form, or cast it into the block with polyurethane"
 # Thickness of a collar's or block's walls round an end: a share of its width, within [m], and where
 # there is no room for that, as thick as jaws with screws may be, and as a cap that is drilled.
 OF_WIDTH, THICKEST, WALLS = 0.25, 10e-3, (5e-3, 2e-3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.shop import HARD, STEEL, Shop
 from chamberopt.common.errors import InputError
 from chamberopt.design.materials import alloy, alloys, ball, balls, find
@@ -13,16 +14,16 @@ HARDER = 1.25
 HARDENED_HB = 280.0  # of steel: from here on it was hardened, to what its name does not tell
 # By metal of the part. Of aluminium: SAE AMS-S-13165, note 5 to table VI (design/intensity.py).
 IRON = {
-    "aluminium": "STEEL LEAVES IRON on aluminium: decontaminate (note 5 to table VI of SAE "
+    "aluminium": f"{MatterKind.IRON} on aluminium: decontaminate (note 5 to table VI of SAE "
     "AMS-S-13165), or ceramic balls, such as --shot zirconia",
-    "titanium": "STEEL LEAVES IRON on titanium: decontaminate, or ceramic balls, such as --shot "
+    "titanium": f"{MatterKind.IRON} on titanium: decontaminate, or ceramic balls, such as --shot "
     "zirconia (no source read)",
-    "cobalt": "STEEL LEAVES IRON on cobalt, as of implants: decontaminate, or ceramic balls, "
+    "cobalt": f"{MatterKind.IRON} on cobalt, as of implants: decontaminate, or ceramic balls, "
     "such as --shot zirconia (no source read)",
 }
 ON_STAINLESS = (
-    "STEEL LEAVES IRON on stainless steel, which rusts: passivate the part, or ceramic balls, such "
-    "as --shot zirconia (no source read)"
+    f"{MatterKind.IRON} on stainless steel, which rusts: passivate the part, or ceramic balls, "
+    "such as --shot zirconia (no source read)"
 )
 
 
@@ -70,9 +71,9 @@ def iron_of_walls(part: str, walls: str) -> str:
     name = "stainless steel" if own.stainless else own.metal
     hard = "stainless steel" if own.stainless else "titanium or aluminium"
     return (
-        f"IRON FROM THE WALLS: balls carry what they wear from {of_walls.name} onto {name}, "
-        f"whatever they are made of: walls of {hard}, or lined with it, which slow the balls more "
-        "where they are softer (simulate again), or decontaminate the part after "
+        f"{MatterKind.IRON_FROM_WALLS}: balls carry what they wear from {of_walls.name} onto "
+        f"{name}, whatever they are made of: walls of {hard}, or lined with it, which slow the "
+        "balls more where they are softer (simulate again), or decontaminate the part after "
         "peening (no source read)"
     )
 
@@ -90,7 +91,7 @@ def hardness_in_words(part: str, shot: str) -> str:
     if metal.metal != "steel" or metal.stainless or metal.hardness_HB < HARDENED_HB:
         return ""
     state = metal.condition.replace(";", ",").replace(f", {metal.hardness_HB:g} HB", "")
-    text = f"; HARDNESS ASSUMED, {metal.hardness_HB:g} HB ({state}): confirm it, as "
+    text = f"; {MatterKind.HARDNESS}, {metal.hardness_HB:g} HB ({state}): confirm it, as "
     if shot == HARD:
         return (
             f"{text}it decides the balls: of steel, {ball(STEEL).hardness_HB:g} HB, they are "

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.face_shapes import (
@@ -63,7 +64,7 @@ RUNNING = re.compile(
     r"(?<![a-z])(?:pin|journal|race|bearing|zapfen|platform|dove.?tail|fir.?tree)s?(?![a-z])", re.I
 )
 CONFIRM = "confirm that it is what fails in use (choose another: --target)"
-BY_SIZE, BY_SHAPE = f"CHOSEN BY SIZE ALONE: {CONFIRM}", f"CHOSEN BY SHAPE: {CONFIRM}"
+BY_SIZE, BY_SHAPE = f"{MatterKind.BY_SIZE}: {CONFIRM}", f"{MatterKind.BY_SHAPE}: {CONFIRM}"
 AS_LARGE = 0.9  # of the largest face's area: the target takes a face as large, e.g. a blade's back
 LARGE_PATTERN = 0.1  # least share of the part's area of faces that repeat, such as those of teeth
 SHARPER_DEG = 45.0, 60.0  # of edges, where those of CREASE_DEG part a coarse mesh into facets
@@ -268,7 +269,7 @@ def fewer_fillets(mesh: PartMesh, target: Target) -> list[Target]:
         these = ", ".join(f"{one.name} ({one.text})" for one in without)
         text = (
             "by their shape, as such are usually peened, and so that an end is free to hold it by; "
-            f"FILLETS ARE NOT IN THE TARGET, {these}: give them a design of their own, by {asked}; "
+            f"{MatterKind.FILLETS_LEFT}, {these}: give them a design of their own, by {asked}; "
             f"{BY_SHAPE}"
         )
         found.append(_joined(left, text))

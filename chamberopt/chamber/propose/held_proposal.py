@@ -23,6 +23,7 @@ from chamberopt.chamber.layout.grip import thin_grip
 from chamberopt.chamber.layout.holder import end_holder, holder_choices
 from chamberopt.chamber.layout.sizes import LONG
 from chamberopt.chamber.layout.target import CREASE_DEG, Target
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.propose.proposal import (
     HarmError,
     Proposal,
@@ -104,7 +105,7 @@ def held(
         if made is not None:
             return made
         why = why or harm
-    text = f"sonotrode to ceiling; NOTHING HOLDS THE PART: {why}"
+    text = f"sonotrode to ceiling; {MatterKind.NOTHING_HOLDS}: {why}"
     return replace(free, reasons={**free.reasons, "chamber.height_mm": text})
 
 
@@ -235,21 +236,21 @@ def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
     left = np.where(part.target, (1.0 - share) * part.area, 0.0)
     place = one_of(part.vertices[part.triangles].mean(axis=1), left)
     text = (
-        f"PLACES ARE LEFT OUT, {left_out:.1%} of the target, {_where_left(made, left)}which balls "
-        f"hardly touch here, such as at {place} in the chamber: agree on it, or take smaller balls "
-        "(--ball-mm)"
+        f"{MatterKind.PLACES_LEFT}, {left_out:.1%} of the target, {_where_left(made, left)}which "
+        f"balls hardly touch here, such as at {place} in the chamber: agree on it, or take smaller "
+        "balls (--ball-mm)"
     )
     if root := _sharp_root(made, left):
         text = (
-            f"ROOTS ARE SHARP IN THE FILE, {left_out:.1%} of the target, such as at {root} in the "
+            f"{MatterKind.SHARP_ROOTS}, {left_out:.1%} of the target, such as at {root} in the "
             "chamber, and no ball gets into them: draw the radius that the part has there, or "
             "agree on it"
         )
     if (radius := _narrow_fillets(made, left)) > 0.0:
         text = (
-            f"FILLETS ARE LEFT OUT, of about {1e3 * radius:.2g} mm, {left_out:.1%} of the target, "
-            f"such as at {place} in the chamber: they are where parts fail: take balls of less "
-            f"than {2e3 * radius:.2g} mm (--ball-mm), or agree on it"
+            f"{MatterKind.FILLETS_NOT_REACHED}, of about {1e3 * radius:.2g} mm, {left_out:.1%} of "
+            f"the target, such as at {place} in the chamber: they are where parts fail: take balls "
+            f"of less than {2e3 * radius:.2g} mm (--ball-mm), or agree on it"
         )
     return replace(narrowed, reasons={**narrowed.reasons, "part.target.reachable": text})
 

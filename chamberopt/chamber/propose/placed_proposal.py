@@ -23,6 +23,7 @@ from chamberopt.chamber.layout.pose import AT_SIDE, Turns, pose_by_size, pose_in
 from chamberopt.chamber.layout.shot_material import choose_shot, hardness_in_words, iron_of_walls
 from chamberopt.chamber.layout.target import Surface, Target
 from chamberopt.chamber.layout.turning import RPM, Spindle, turning_bore, turning_pose
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.part import Part, posed_part
 from chamberopt.chamber.propose.held_proposal import (
     held,
@@ -44,7 +45,6 @@ from chamberopt.chamber.propose.proposal import (
     nested,
     touched_share,
 )
-from chamberopt.chamber.propose.proposed_budget import OF_TIME
 from chamberopt.chamber.propose.proposed_clamp import clamped_outside, grips_poorly, why_not_turned
 from chamberopt.chamber.propose.proposed_room import (
     AMPLITUDE_UM,
@@ -72,7 +72,6 @@ FEW = 2  # sonotrodes side by side that are better than a room of which the part
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
 TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
-START = f"{OF_TIME[2]}, a start"
 FEWER = "so that a strip of it takes few sonotrodes"
 TURNED = "its axis level: about it the part turns, so that all of it passes the shot"
 NO_SPINDLE = "--pose: given turning, but {}; give another pose, or another target (--target)"
@@ -275,7 +274,7 @@ def _set_up(given: Given, stance: Stance) -> _Setup:
     measures = f"the part measures {format_box(mesh.size)}"
     by = "as asked" if wanted.unit in METRES_PER else "by the file"
     reasons = {
-        "part.unit": f"UNIT GUESSED: {measures}"
+        "part.unit": f"{MatterKind.UNIT}: {measures}"
         if is_guessed
         else f"{measures}, unit {mesh.unit}, {by}",
         "part.target": target.reason,
@@ -284,12 +283,13 @@ def _set_up(given: Given, stance: Stance) -> _Setup:
         "materials.part": "how balls rebound from it (C0, v0) is computed: to be calibrated"
         + hardness_in_words(given.alloy, shot)
         if wanted.alloy
-        else "ALLOY NOT KNOWN, a guess: chamberopt materials lists alloys",
+        else f"{MatterKind.ALLOY}, a guess: chamberopt materials lists alloys",
         "materials.wall": "hardened, as soft walls slow the balls; give yours"
         + (f"; {iron}" if (iron := iron_of_walls(given.alloy, WALL)) else ""),
         "effects.friction": "mu of these balls on these metals, dry: chamberopt materials",
         "effects.roughness": "rms slope of faces that shot has dented",
-        "process.treatment_time_s": f"{START}: the report has coverage over time",
+        "process.treatment_time_s": f"{MatterKind.NOT_MEASURED} by a pilot, a start: the "
+        "report has coverage over time",
         "process.accuracy.simulated_time_s": "a start: results say what is resolved",
         "process.accuracy.objective_half_width": "until it is so sure; of a time: this share",
     }
@@ -331,7 +331,7 @@ def _built(
                 words["part.rotate_deg"] = why if setup.stance.spindle else TURNED
                 its = "its shaft is" if setup.stance.spindle is None else "its ends are"
                 words["effects.part_turn"] = (
-                    f"TURNED BY A DRIVE, at {RPM:g} rpm: {its} sealed in the wall"
+                    f"{MatterKind.TURNED}, at {RPM:g} rpm: {its} sealed in the wall"
                 )
             own = floor_reasons(floor, setup.goes_out, setup.ball)
             reasons = {**setup.reasons, **words, **own}

@@ -19,6 +19,7 @@ from chamberopt.chamber.layout.pose import Pose, Turns, Upright
 from chamberopt.chamber.layout.sizes import Sizes
 from chamberopt.chamber.layout.target import Surface, Target
 from chamberopt.chamber.layout.turning import Spindle
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.scene import MAX_BALLS, chamber_mesh
 from chamberopt.chamber.shop import Shop, ShopSonotrode
 from chamberopt.common.errors import InputError
@@ -235,8 +236,8 @@ def checked(
     if charge.is_capped:
         full_g = float(f"{1e3 * charge.full * ball_mass:.2g}")
         in_words["shot.mass_g"] += (
-            f"; CHARGE IS CUT for the simulation, which takes hours with more: half a layer is "
-            f"{charge.full:,} balls, {full_g:g} g, and a shop takes it (shot.mass_g)"
+            f"; {MatterKind.CHARGE_CUT} for the simulation, which takes hours with more: half a "
+            f"layer is {charge.full:,} balls, {full_g:g} g, and a shop takes it (shot.mass_g)"
         )
     if beside is not None and not chamber.steps:
         at_once = first_warnings(design, chamber, chamber_mesh(chamber))

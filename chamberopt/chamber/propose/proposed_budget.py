@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.propose.proposal import REPLICAS, Proposal, touched_share
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import rounded
@@ -40,8 +41,6 @@ SET_TIMES = (
 # ones lag behind the target on average: 326 s against 133 s in a joint's chamber, 2900 s against
 # 950 s of a bevel gear's teeth.
 MORE, LAGGING = 1.3, 3.0
-# Beginnings of matters to settle that a simulation settles, once it knows the time to 98 %.
-OF_TIME = "TIME KNOWN ROUGHLY", "TIME NOT RESOLVED", "NOT MEASURED by a pilot"
 ROUGH = 0.4  # half-width of a time over the time, from which on that is a matter to settle
 LONG = 1800.0  # s
 UNEVEN = 1.5  # time of single places over that of the target on average, from which on they rule
@@ -140,7 +139,10 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
     expected = (
         f"about {rounded(dents * gauge, 2)} dents in a window by a pilot; {needed:.0f} would do"
     )
-    few = f"; TOO FEW DENTS are simulated in {MINUTES:g} minutes of two cores: simulate longer"
+    few = (
+        f"; {MatterKind.FEW_DENTS} are simulated in {MINUTES:g} minutes of two cores: simulate "
+        "longer"
+    )
     wider = f"wider than the usual 1 mm²: enough dents within {MINUTES:g} minutes on two cores"
     reasons = {
         "process.treatment_time_s": _said_of_treatment(found, treatment, coverage_percent),
@@ -229,16 +231,16 @@ def _said_of_treatment(found: Measured, treatment: float, coverage_percent: floa
     if found.places:
         is_rough = found.spread > (MORE - 1.0) * found.time_to_98
         more = f", and {'its ±' if is_rough else f'{MORE - 1.0:.0%}'} more"
-    long = f"; LONG: {_said_of_long(found)}" if found.time_to_98 > LONG else ""
+    long = f"; {MatterKind.LONG}: {_said_of_long(found)}" if found.time_to_98 > LONG else ""
     if found.places and found.spread > ROUGH * found.time_to_98:
         known = f"to ± {found.spread / found.time_to_98:.0%}"
-        long += f"; {OF_TIME[0]}, {known}: simulate before it is set"
+        long += f"; {MatterKind.ROUGH_TIME}, {known}: simulate before it is set"
     if not found.places:
         long += (
-            f"; {OF_TIME[1]} for single places, at least {rounded(found.time_to_98, 2)} s: "
-            "simulate before it is set. Without that, peen so long, look at the least open "
-            "places (such as roots) through a magnifier of 10 to 30 times, and go on, for twice as "
-            "long each time, until no more dents are seen"
+            f"; {MatterKind.TIME_NOT_RESOLVED} for single places, at least "
+            f"{rounded(found.time_to_98, 2)} s: simulate before it is set. Without that, peen so "
+            "long, look at the least open places (such as roots) through a magnifier of 10 to 30 "
+            "times, and go on, for twice as long each time, until no more dents are seen"
         )
     wanted = ""
     if coverage_percent is not None:

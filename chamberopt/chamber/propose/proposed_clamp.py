@@ -12,6 +12,7 @@ from chamberopt.chamber.layout.end import DEEP
 from chamberopt.chamber.layout.floor import Floor
 from chamberopt.chamber.layout.grip import Clamp, free_outside, outside_clamp, sides_out
 from chamberopt.chamber.layout.target import apart, area_in_mm2, named_or_all
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.propose.proposal import Proposal, checked, with_table
 from chamberopt.chamber.propose.proposed_mask import rows_of
@@ -42,9 +43,9 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     )
     if _is_cut_all_round(made):
         text += (
-            "; CUT ON SEVERAL SIDES: the part goes out through walls that do not lie opposite, so "
-            "that its openings are long and the room is narrow: give the whole part a room (by a "
-            "larger sonotrode, or --pose standing), or take another target"
+            f"; {MatterKind.CUT_ALL_ROUND}: the part goes out through walls that do not lie "
+            "opposite, so that its openings are long and the room is narrow: give the whole part a "
+            "room (by a larger sonotrode, or --pose standing), or take another target"
         )
     reasons = {**made.reasons, "holder.kind": text}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)

@@ -22,6 +22,7 @@ from chamberopt.chamber.layout.balls import (
     fit_sizes,
     thinnest,
 )
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.propose.proposal import BallTrial, Proposal, Wanted
 from chamberopt.chamber.propose.proposed_budget import Measured
 from chamberopt.chamber.propose.proposed_setting import (
@@ -53,7 +54,7 @@ MOST_PILOTS = 5
 INTENSITY = "process.intensity_mmA"  # whose reason stands in a design without a wish too
 MOST_TRIED = 3  # larger sizes that pilots compare
 FURTHER = 2.0  # times as large as the proposed balls, where no intensity says how far
-LARGER = "LARGER BALLS FOR THE INTENSITY"
+LARGER = f"{MatterKind.LARGER_BALLS}"
 # Larger balls in the place of more than MANY, by heart: at most so many of theirs, share of the
 # target that they serve less, and time over theirs, which pilots know to 10 to 20 %.
 FEWER, SERVED_LESS, AS_QUICK = 0.6, 0.15, 1.1
@@ -338,11 +339,12 @@ def larger_instead(
             and ratio <= AS_QUICK
         ):
             reason = (
-                f"FEWER BALLS, decide: these, {its_count:,} of {there.ball_mm:g} mm, are easier to "
-                f"weigh and sort, {kept.removeprefix('these ')}, suit {other.served:.0%} and cover "
-                f"it about as soon by pilots as {count:,} of {here.ball_mm:g} mm. Keep them unless "
-                f"what lies in narrow slots and fillets, where these suit {fit.served:.0%}, is to "
-                f"be peened as soon as the rest: then --ball-mm {here.ball_mm:g}"
+                f"{MatterKind.FEWER_BALLS}, decide: these, {its_count:,} of {there.ball_mm:g} mm, "
+                f"are easier to weigh and sort, {kept.removeprefix('these ')}, suit "
+                f"{other.served:.0%} and cover it about as soon by pilots as {count:,} of "
+                f"{here.ball_mm:g} mm. Keep them unless what lies in narrow slots and fillets, "
+                f"where these suit {fit.served:.0%}, is to be peened as soon as the rest: then "
+                f"--ball-mm {here.ball_mm:g}"
             )
         else:
             continue
@@ -377,7 +379,7 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
     if predicted is not None:
         expected = f"expected {_with_strip(predicted)}"
     usual = usual_intensity(metal, thickness)
-    beside = f"NO USUAL INTENSITY: {why_none(metal, thickness)}"
+    beside = f"{MatterKind.NO_USUAL}: {why_none(metal, thickness)}"
     now, least = setting_of(made), min(amplitudes_of(made.sonotrode)[1])
     if predicted is not None and 1e3 * thickness < THIN_MM and least < now.amplitude_um:
         weakest = expected_intensity(now._replace(amplitude_um=least), {now: predicted.value})
@@ -386,7 +388,7 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
         beside = f"{usual.low:g}-{usual.high:g}A are {usual.text}; to aim at it: --intensity usual"
         if predicted is not None and usual.off(predicted.value):
             beside = (
-                f"OUTSIDE THE USUAL RANGE, {usual.low:g}-{usual.high:g}A, {usual.text}: agree on "
+                f"{MatterKind.UNUSUAL}, {usual.low:g}-{usual.high:g}A, {usual.text}: agree on "
                 "it, or aim at it: --intensity usual"
             )
         elif predicted is not None and not usual.low <= predicted.value <= usual.high:
@@ -401,9 +403,9 @@ def with_thin_places(made: Proposal) -> Proposal:
     if 1e3 * thin >= THIN_MM:
         return made
     text = (
-        f"THIN PLACES: {THIN_SHARE:.0%} of the target has {plain(1e3 * thin, 2)} mm of metal or "
-        f"less under it, for which balls of at most {plain(1e3 * OF_THIN * thin, 2)} mm are "
-        "proposed (a rule of thumb): agree on its intensity, or mask its edges"
+        f"{MatterKind.THIN_PLACES}: {THIN_SHARE:.0%} of the target has {plain(1e3 * thin, 2)} mm "
+        f"of metal or less under it, for which balls of at most {plain(1e3 * OF_THIN * thin, 2)} "
+        "mm are proposed (a rule of thumb): agree on its intensity, or mask its edges"
     )
     reason = f"{made.reasons['shot.diameter_mm']}; {text}"
     return replace(made, reasons={**made.reasons, "shot.diameter_mm": reason})
@@ -472,7 +474,7 @@ def _told(
     off, more = wanted.off(predicted.value), ""
     if off:
         aim = f"{wanted.low:g}-{wanted.high:g}A"
-        more = f"; NO BALLS THAT SUIT THE TARGET GIVE {aim}: {_needed(made, off)}"
+        more = f"; {MatterKind.NO_BALLS} {aim}: {_needed(made, off)}"
     reasons = dict(made.reasons)
     ball = "the nearest to the intensity" if off else "chosen for the intensity"
     reasons[f"sonotrode.{key}"] += f", {ball}"

@@ -27,6 +27,7 @@ from chamberopt.chamber.layout.end import Strips
 from chamberopt.chamber.layout.grip import FLAT_DEG
 from chamberopt.chamber.layout.pose import Turns
 from chamberopt.chamber.layout.target import RUNNING, Surface, apart, area_in_mm2, named_or_all
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.part import chosen_on_part, of_target
 from chamberopt.chamber.propose.proposal import Proposal, touched_share
 from chamberopt.common.errors import InputError, one_line
@@ -153,7 +154,7 @@ def open_holes(proposal: Proposal) -> str:
     pin = "pins as wide in them" if several else f"a pin of {words[0][0]} in it"
     wall = "the wall" if several else words[0][1]
     return (
-        f"{'HOLES' if several else 'A HOLE'} THROUGH THE WALL, not plugged: the part's, of "
+        f"{MatterKind.HOLES if several else MatterKind.HOLE}, not plugged: the part's, of "
         f"{', '.join(listed)}{more}: balls leave through {'them' if several else 'it'} unless "
         f"{'each' if several else 'it'} is closed, as by {pin}, up to {wall}"
     )
@@ -237,14 +238,15 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
     posed = proposal.chamber.part
     if (sharp := sharp_edges(posed.vertices, posed.triangles, posed.target)) > LEAST_EDGES:
-        found.append(LeftOut({}, f"SHARP EDGES, {1e3 * sharp:.0f} mm of the target's{EDGES}"))
+        long = f"{1e3 * sharp:.0f} mm of the target's"
+        found.append(LeftOut({}, f"{MatterKind.SHARP_EDGES}, {long}{EDGES}"))
     met = posed.target | (touched(proposal.design, proposal.chamber) > 0.5)
     bare = bare_behind(posed.vertices, posed.triangles, posed.target, met, 1e-3 * THIN_MM)
     if bare > ONE_SIDED:
         found.append(
             LeftOut(
                 {},
-                f"ONE SIDE OF THIN METAL, {bare:.0%} of the target: less than {THIN_MM:.2g} mm "
+                f"{MatterKind.ONE_SIDE}, {bare:.0%} of the target: less than {THIN_MM:.2g} mm "
                 "under it, and the far side is not peened: it bends, as sheets are formed; peen "
                 "both, or agree on it",
             )
@@ -253,8 +255,9 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
         found.append(
             LeftOut(
                 {},
-                f"CLEAR OF THE MACHINE: outside of the walls the part reaches {-1e3 * lowest:.3g} "
-                "mm below the sonotrode's face, where the machine must leave it room",
+                f"{MatterKind.CLEAR_OF_MACHINE}: outside of the walls the part reaches "
+                f"{-1e3 * lowest:.3g} mm below the sonotrode's face, where the machine must "
+                "leave it room",
             )
         )
     if text := open_holes(proposal):
@@ -290,8 +293,8 @@ def unlike_settings(proposal: Proposal, strips: Strips) -> str:
     if not why:
         return ""
     return (
-        f"SETTINGS {', '.join(map(str, why))} of {strips.settings} need a chamber of their own: "
-        f"{'; '.join(dict.fromkeys(why.values()))}"
+        f"{MatterKind.SETTINGS} {', '.join(map(str, why))} of {strips.settings} need a chamber of "
+        f"their own: {'; '.join(dict.fromkeys(why.values()))}"
     )
 
 
@@ -370,8 +373,9 @@ def moved_openings(chamber: Chamber) -> str:
             if _is_elsewhere(one, near := _nearest(one, other)):
                 before, after = (x and _in_words(x) for x in (one, near))
                 return (
-                    f"OPENINGS CHANGE in the second pose, one from {before} in the chamber's frame "
-                    f"to {after or 'none'}: a second wall or insert, and jaws that suit it"
+                    f"{MatterKind.OPENINGS_CHANGE} in the second pose, one from {before} in the "
+                    f"chamber's frame to {after or 'none'}: a second wall or insert, and jaws "
+                    "that suit it"
                 )
     return ""
 
@@ -460,10 +464,11 @@ def met_beside(proposal: Proposal, target: np.ndarray) -> Iterator[LeftOut]:
         text += f"{' and ' if text else ''}{area_in_mm2(rest)} {'more' if text else 'beside it'}"
     if not text:
         return
-    still = "STILL " if proposal.design.mask is not None else ""
+    is_bare = proposal.design.mask is None
+    kind = MatterKind.NOT_MASKED if is_bare else MatterKind.STILL_NOT_MASKED
     runs = "runs or fits by its name, and " if met and RUNNING.search(met[0][0].name) else ""
     yield LeftOut(
         {},
-        f"{still}NOT MASKED: the shot also meets {text}; {runs}what has to keep "
+        f"{kind}: the shot also meets {text}; {runs}what has to keep "
         "its size and finish takes a mask",
     )

@@ -26,6 +26,7 @@ from chamberopt.chamber.layout.balls import (
     reaches,
 )
 from chamberopt.chamber.layout.floor import of_blocks
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.propose.proposal import (
     Proposal,
     faults,
@@ -301,8 +302,8 @@ def with_finer_balls(
         f"for the intensity, about {plain(found.intensity.value, 2)} mmA on the {most.served:.0%} "
         f"of the target that they suit; the second, {count:,} balls ({mass_g:g} g){weaker} for "
         f"narrow places: they serve {fine.served:.0%}; each until it has covered by itself what it "
-        "touches; TWO INTENSITIES: narrow places get that of the finer balls alone: agree on it, "
-        f"or take one size (--ball-mm {finer_mm:g} or {coarse_mm:g})"
+        f"touches; {MatterKind.TWO_INTENSITIES}: narrow places get that of the finer balls alone: "
+        f"agree on it, or take one size (--ball-mm {finer_mm:g} or {coarse_mm:g})"
     )
     return replace(two, reasons={**two.reasons, ".steps": reason}), ""
 

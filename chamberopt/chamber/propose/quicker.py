@@ -21,6 +21,7 @@ import numpy as np
 from chamberopt.chamber.layout.balls import MOST_BALLS
 from chamberopt.chamber.layout.floor import SEVERAL
 from chamberopt.chamber.layout.pose import AT_SIDE, TURNING, Pose
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.propose.held_proposal import rests
 from chamberopt.chamber.propose.proposal import (
     PoseTrial,
@@ -45,7 +46,6 @@ POSES: tuple[Pose, ...] = (*AT_SIDE, TURNING)
 OF_TURNED: tuple[Pose, ...] = ("standing", *AT_SIDE)
 LAYER = 2.0  # over half a layer
 NOT_COMPARED = "not compared: its places are not resolved"
-TRIED = "poses tried by pilots"  # begins the clause of a reason that tells all of them
 Measure = Callable[[Proposal, float], Measured | None]
 Counted = Callable[[str, int], AbstractContextManager[Progress]]
 SAME = 0.999  # cosine between the directions that point up, from which on a pose is no other one
@@ -270,22 +270,19 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
         pose = one.wanted.pose or (TURNING if turns(one.made) else "evenly exposed")
         return pose.replace("-", " ") + over
 
-    texts, trials = [], []
+    trials = []
     for one, harm in [(first, ""), *tried]:
-        name, outcome = named(one), harm
-        what = harm or _said(one.found)
+        outcome, found = harm, one.found
         if one is not best and one.found and best.found and one.found.places:
             why = _objection(one, one.found, best, best.found)
             if why and one.found.time_to_98 < best.found.time_to_98:
-                what += f" ({why})"
                 outcome = why
         if _is_rough(one, best):
             outcome = outcome or NOT_COMPARED
-        count, found = one.made.sonotrode_count, one.found
         trials.append(
             PoseTrial(
-                name,
-                count,
+                named(one),
+                one.made.sonotrode_count,
                 one.made.settings,
                 found and found.time_to_98,
                 found is not None and found.places,
@@ -293,20 +290,16 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
                 "taken" if one is best else outcome,
             )
         )
-        on, taken = f" on {count} sonotrodes" if count > 1 else "", " (taken)" * (one is best)
-        on += f" in {one.made.settings} settings" if one.made.settings > 1 else ""
-        texts.append(f"{name}{on}: {what}{taken}")
-    if len(texts) == 1:
+    if len(trials) == 1:
         return best
-    pose, _, why = best.made.reasons["part.rotate_deg"].rpartition(": ")
-    ball = first.made.tables["shot"]["diameter_mm"]  # those of the proposal may be others
-    tried_ones = f"{TRIED} with balls of {ball:g} mm: {', '.join(texts)}"
+    reason = best.made.reasons["part.rotate_deg"]
+    if best is not first:
+        reason = f"{reason.rpartition(': ')[0]}: the quickest of {len(trials)} by pilots"
     for one, harm in tried:
         if not harm and _is_rough(one, best) and _time(one) < HALF * _time(best):
-            tried_ones += (
-                f"; POSE NOT DECIDED: {named(one)}, {_said(one.found)}, may be quicker than what "
+            reason += (
+                f"; {MatterKind.POSE}: {named(one)}, {_said(one.found)}, may be quicker than what "
                 f"is proposed, {_said(best.found)}: propose it too (--pose), and simulate both"
             )
-    reason = f"{pose}: {why}; {tried_ones}" if best is first else f"{pose}: {tried_ones}"
     reasons = {**best.made.reasons, "part.rotate_deg": reason}
     return best._replace(made=replace(best.made, reasons=reasons, poses=tuple(trials)))

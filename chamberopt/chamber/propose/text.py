@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,6 +13,7 @@ from chamberopt.chamber.checks.place_names import PART
 from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.layout.balls import MANY, MISSED
 from chamberopt.chamber.layout.target import Surface
+from chamberopt.chamber.matters import Matter, MatterKind, matter_of
 from chamberopt.chamber.propose.proposal import Proposal
 from chamberopt.chamber.propose.proposed_budget import LONG
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
@@ -29,10 +29,6 @@ from chamberopt.design.load import Design, with_paths_from
 MAX_LISTED = 20  # surfaces in a comment
 EVALUATIONS, SEARCH_HALF_WIDTH = 20, 0.04
 SEARCH_REPLICAS = 4
-# At the beginning of a clause of a reason: the clause is to be settled, unless a standard's name
-# begins it.
-TO_SETTLE = re.compile(r"(?:A )?[A-Z][A-Z-]+(?: [A-Z-]{2,})*\b")
-STANDARD = "SAE "
 TARGET = "part.target"  # its reason begins with its name
 
 
@@ -70,18 +66,13 @@ GOALS = {
 }
 
 
-def clauses(reason: str) -> tuple[list[str], list[str]]:
-    """Return the clauses of a reason: why a value is so, and what is to be settled about it."""
-    why: list[str] = []
-    settle: list[str] = []
-    for clause in filter(None, one_line(reason).split("; ")):
-        found = TO_SETTLE.match(clause)
-        marks = found is not None and len(found[0]) > 3 and not found[0].startswith(STANDARD)
-        (settle if marks else why).append(clause)
-    return why, settle
+def clauses(reason: str) -> tuple[list[str], list[Matter]]:
+    """Return the clauses of a reason: why a value is so, and the matters about it."""
+    found = [matter_of(one) for one in filter(None, one_line(reason).split("; "))]
+    return [one.text for one in found if one.kind is None], [one for one in found if one.kind]
 
 
-def _clauses_of(proposal: Proposal) -> dict[str, tuple[list[str], list[str]]]:
+def _clauses_of(proposal: Proposal) -> dict[str, tuple[list[str], list[Matter]]]:
     """Return the clauses of each reason, by its key, but for keys that the design has not.
 
     A target's name is never to be settled.
@@ -96,10 +87,10 @@ def _clauses_of(proposal: Proposal) -> dict[str, tuple[list[str], list[str]]]:
     return found
 
 
-def to_settle(proposal: Proposal, left_out: Sequence[LeftOut]) -> list[str]:
-    """Return what is to be settled before the proposed chamber is built, the target first.
+def to_settle(proposal: Proposal, left_out: Sequence[LeftOut]) -> list[Matter]:
+    """Return the matters of a proposal, the most urgent first.
 
-    What follows is in the order of the design file.
+    Of those as urgent the target's are first, and what follows is in the order of the design file.
 
     Args:
         left_out: what may be left out of the target, or is peened beside it.
@@ -112,13 +103,16 @@ def to_settle(proposal: Proposal, left_out: Sequence[LeftOut]) -> list[str]:
 
     said = _clauses_of(proposal)
     found = [one for key in sorted(said, key=place) for one in said[key][1]]
-    found += [*_resting_balls(proposal), *_many_balls(proposal), *_quicker_balls(proposal)]
+    found += map(
+        matter_of,
+        [*_resting_balls(proposal), *_many_balls(proposal), *_quicker_balls(proposal)],
+    )
     for one in left_out:
         keys = " and ".join(f"part.target.{key}" for key in one.keys)
         many = "" if len(one.keys) > 1 else "s"
         leave = f": {keys} in the design leave{many} it out" if keys else ""
-        found.append(f"{one_line(one.text)}{leave}")
-    return list(dict.fromkeys(found))
+        found.append(matter_of(f"{one_line(one.text)}{leave}"))
+    return sorted(dict.fromkeys(found), key=lambda one: one.urgency)
 
 
 def _resting_balls(proposal: Proposal) -> Iterator[str]:
@@ -128,7 +122,7 @@ def _resting_balls(proposal: Proposal) -> Iterator[str]:
     """
     for one in proposal.warnings:
         if one.kind is WarningKind.REST and PART in one.about:
-            yield one.message.replace("balls can come to rest", "BALLS CAN COME TO REST", 1)
+            yield one.message.replace("balls can come to rest", MatterKind.RESTING_BALLS, 1)
 
 
 def _many_balls(proposal: Proposal) -> Iterator[str]:
@@ -139,7 +133,7 @@ def _many_balls(proposal: Proposal) -> Iterator[str]:
     if count > MANY:
         fewer = (one for one in proposal.trials if 1e-3 * one.ball_mm > size and one.count < count)
         larger = [f": {one.ball_mm:g} mm would suit {one.fit.served:.0%}" for one in fewer]
-        yield f"MANY BALLS, {count:,}, to be dosed and sorted{''.join(larger[:1])}"
+        yield f"{MatterKind.MANY_BALLS}, {count:,}, to be dosed and sorted{''.join(larger[:1])}"
 
 
 def _quicker_balls(proposal: Proposal) -> Iterator[str]:
@@ -152,7 +146,8 @@ def _quicker_balls(proposal: Proposal) -> Iterator[str]:
     as_good = [one for one in times if fits[one].touched >= fits[ball].touched - MISSED]
     best = min(as_good, key=times.__getitem__)
     if times[best] < HALF * times[ball]:
-        yield f"QUICKER BALLS: of {best:g} mm, by pilots about {rounded(times[best], 2)} s"
+        time = f"by pilots about {rounded(times[best], 2)} s"
+        yield f"{MatterKind.QUICKER_BALLS}: of {best:g} mm, {time}"
 
 
 def design_text(proposal: Proposal, folder: Path, left_out: Sequence[LeftOut] = ()) -> str:
@@ -167,8 +162,8 @@ def design_text(proposal: Proposal, folder: Path, left_out: Sequence[LeftOut] = 
     rules = "proposed by `chamberopt new`: rules of thumb to vary."
     lines = [f"# A first chamber for {one_line(name)}, {rules}", ""]
     if settle := to_settle(proposal, left_out):
-        lines += ["to_settle = [  # before it is built; take out what is settled"]
-        lines += [*(f"  {_line('', one)[3:]}," for one in settle), "]"]
+        lines += ["to_settle = [  # the most urgent first; take out what is settled"]
+        lines += [*(f"  {_line('', one.sentence)[3:]}," for one in settle), "]"]
     why = {key: "; ".join(said[0]) for key, said in _clauses_of(proposal).items()}
     for table, values in tables.items():
         title = f"[{table}]" + (f"  # {why[table]}" if why.get(table) else "")

@@ -21,6 +21,7 @@ from chamberopt.documents.sheet.settings import (
 from chamberopt.documents.sheet.warned import (
     alarms,
     cautions,
+    matter_tables,
     tolerance_rows,
     unusual_intensity,
     warning_rows,
@@ -129,6 +130,7 @@ def limit_tables(result: Result, openings: Sequence[Opening] = ()) -> list[Table
         openings: through which the part goes out.
     """
     return _tables([
+        *matter_tables(result),
         ("Zones and limits", zone_rows(result)),
         ("Tolerances", tolerance_rows(result, openings)),
         ("Not in these figures", (("", text) for text in cautions(result))),

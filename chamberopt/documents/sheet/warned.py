@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING
 
+from chamberopt.chamber.matters import Urgency
 from chamberopt.common.key_words import key_in_words, title_with_unit
 from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
 from chamberopt.design.tolerances import USUAL, USUAL_IN_WORDS, tolerance_box
 from chamberopt.documents.answer import answer_lines, shot_lines
-from chamberopt.documents.report import open_matters, open_warnings
+from chamberopt.documents.report import open_matters, own_warnings
 from chamberopt.documents.sheet.expected import expected_figures
 from chamberopt.documents.sheet.openings import FOLLOWS
 from chamberopt.documents.sheet.rows import (
@@ -44,10 +46,10 @@ def alarms(result: Result) -> Iterator[str]:
     shot that had not settled, a time that leaves the target bare or is too short for the wanted
     coverage, and an intensity outside of its range.
     """
-    if count := len(open_matters(result)):
+    if count := sum(one.urgency is Urgency.BEFORE_BUILDING for one in open_matters(result)):
         yield (
             f"{count} matter{'s are' if count > 1 else ' is'} to be settled before this is built: "
-            "see Warnings."
+            f"see “{Urgency.BEFORE_BUILDING.in_words}”."
         )
     told = expected_figures(result)
     if result.design.calibration is None:  # without one they are rough, resolved or not
@@ -150,11 +152,18 @@ def tolerance_rows(result: Result, openings: Sequence[Opening] = ()) -> Iterator
         yield from sheet_rows(found)
 
 
+def matter_tables(result: Result) -> Iterator[tuple[str, Iterator[Row]]]:
+    """Yield title and rows of a table with the matters of each urgency."""
+    for urgency, found in groupby(open_matters(result), lambda one: one.urgency):
+        texts = [for_the_shop(keys_in_words(one.sentence)) for one in found]
+        yield urgency.in_words, (("", text) for text in texts)
+
+
 def warning_rows(result: Result) -> Iterator[Row]:
     warnings = result.record.warnings
     if warnings is None:
         yield "", "The design was not checked, so that its warnings are not known."
-    elif not (left := open_warnings(result)):
+    elif not (left := own_warnings(result)):
         yield "", "There are none."
     else:
         yield from (("", for_the_shop(keys_in_words(text))) for text in left)

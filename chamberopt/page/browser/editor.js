@@ -4,7 +4,7 @@ import { fillSurfaces, fillTarget, names, showChosen } from "./target.js";
 import { fillRun, follow } from "./run.js";
 import { closeResults } from "./results.js";
 import "./study/study.js";
-import { addStep, ask, attempt, change, element, isUnsaved, listen, onPage, read, redo, removeStep, say, showAdded, showStep, state, takeTold, undo, unpack, value, warning, wordsOf } from "./state.js";
+import { addStep, ask, attempt, byUrgency, change, element, isUnsaved, listen, onPage, read, redo, removeStep, say, showAdded, showStep, state, takeTold, undo, unpack, value, warning, wordsOf } from "./state.js";
 import { lookAnew, setHandles, showCavity, showPart, showShape, showState } from "./scene.js";
 
 const find = (id) => document.getElementById(id);
@@ -121,7 +121,8 @@ function refuse(error) {
 // What is to be settled before the chamber is built, each until a click says that it is.
 function fillSettle() {
   const open = state.changes.to_settle ?? state.file.to_settle.map((one) => one.text);
-  const rows = state.file.to_settle.filter((one) => open.includes(one.text)).map((one) => {
+  const left = state.file.to_settle.filter((one) => open.includes(one.text)), fold = find("settle");
+  const lists = byUrgency(left, (one) => {
     const done = element("button", { type: "button", textContent: "Mark as settled", title: "take it out of the design" });
     done.addEventListener("click", () => change({ to_settle: open.filter((text) => text !== one.text) }));
     const takes = one.takes.map(({ label, changes }) => {
@@ -133,12 +134,11 @@ function fillSettle() {
     const words = isMeant ? [`: ${one.meets.join(", ")} ${one.meets.length > 1 ? "are" : "is"} in the target now, so that this is settled.`] : onPage(one.words);
     return element("li", {}, element("span", {}, element("b", { textContent: one.mark }), ...words), ...takes, done);
   });
-  const list = element("ol", {}, ...rows), fold = find("settle");
   const isOld = state.file.is_proposed && Object.keys(state.changes).some((name) => state.file.of_matters.includes(name.split(".")[0]));
   const note = isOld ? [element("p", { className: "warning", textContent: "Told of what was proposed, and you changed some of it: settle those that still hold." })] : [];
-  fold.hidden = !rows.length;
-  fold.firstElementChild.textContent = `${rows.length} to be settled before it is built`;
-  fold.lastElementChild.replaceChildren(...note, list);
+  fold.hidden = !left.length;
+  fold.firstElementChild.textContent = `${left.length} to be looked at`;
+  fold.lastElementChild.replaceChildren(...note, ...lists);
 }
 
 function sayOf({ facts, unpeened, warnings, notes }) {

@@ -1,5 +1,5 @@
 // The front page: a part's file, what is known of it, and the design that `new` proposes.
-import { asLines, ask, attempt, element, onPage, unpack, warning } from "./state.js";
+import { asLines, ask, attempt, byUrgency, element, onPage, unpack, warning } from "./state.js";
 import { followed, sinceBegin, stage } from "./steps.js";
 import { BODIES, colourByState, DIMENSIONS, drawBodies, drawDimensions, lights } from "./surfaces.js";
 
@@ -196,7 +196,7 @@ function tell({ steps, stage: at, seconds, printed, warnings, fault, exit, pictu
 function showProposal({ sentence, rows, tables, matters, choices }, design) {
   find("sentence").replaceChildren(...onPage(sentence));
   find("to-settle").hidden = !matters.length;
-  find("matters").replaceChildren(...matters.map(({ mark, text, balls }) => element("li", {}, element("b", { textContent: mark }), ...onPage(text), ...balls.map(withBalls))));
+  find("to-settle").replaceChildren(...byUrgency(matters, ({ mark, text, balls }) => element("li", {}, element("b", { textContent: mark }), ...onPage(text), ...balls.map(withBalls))));
   find("rows").replaceChildren(...rows.map(({ name, value, reasons }) => element("tr", {},
     element("th", { textContent: name[0].toUpperCase() + name.slice(1) }),
     element("td", {}, element("b", {}, ...onPage(value)), ...reasons.map((words) => element("p", {}, ...onPage(words)))))));

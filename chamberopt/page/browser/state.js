@@ -149,6 +149,9 @@ export const onPage = (words) => [words].flat().map((one) => typeof one === "str
 export const asLines = (messages) => messages.flatMap((words) => [...onPage(words), "\n"]);
 // A warning as one line, which opens on a click.
 export const warning = (words) => element("details", { className: "warned" }, element("summary", {}, ...onPage(words)));
+// A heading and a list of the matters of each urgency.
+export const byUrgency = (matters, item) => Object.entries(Object.groupBy(matters, (one) => one.urgency))
+  .flatMap(([urgency, found]) => [element("h3", { textContent: urgency }), element("ol", {}, ...found.map(item))]);
 export const wordsOf = (error) => error.words ?? error.message;
 
 export function say(text, good = false) {

@@ -207,7 +207,7 @@ def test_a_guess_is_said_and_no_folder_is_held_while_the_design_is_made(
     monkeypatch.setattr("chamberopt.workflows.propose.draw_target", lambda *_: "no picture")
     assert main(["new", "box.stl", "--unit", "guess", "--out", "out", "--no-pilot"]) == 0
     said = capfd.readouterr()
-    assert "2. UNIT GUESSED: the part measures 20 x 20 x 30 mm." in said.out
+    assert "UNIT GUESSED: the part measures 20 x 20 x 30 mm." in said.out
     assert "unit guessed as 'mm' (by its size)" in said.err
     assert "give --unit if that is wrong" in said.err
     assert not held

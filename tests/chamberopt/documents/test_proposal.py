@@ -6,6 +6,7 @@ import pytest
 import trimesh
 
 from chamberopt.chamber.layout.balls import SizeFit
+from chamberopt.chamber.matters import Matter, MatterKind, Urgency, matter_of
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import BallTrial, Proposal, Wanted
 from chamberopt.chamber.propose.proposed_mask import LeftOut
@@ -16,7 +17,6 @@ from chamberopt.documents.proposal import (
     _in_short,
     _intensity,
     clauses,
-    matter_of,
     proposal_in_words,
     proposal_lines,
     time_in_words,
@@ -69,7 +69,7 @@ def test_the_target_has_one_area_and_a_time_that_no_pilot_told_is_a_start(made: 
 
 def test_balls_that_are_many_are_told_with_what_pilots_say_of_larger_ones(made: Proposal) -> None:
     ball = made.tables["shot"]["diameter_mm"]
-    assert not any("MANY" in one.mark for one in proposal_in_words(made, []).matters)
+    assert not any(one.kind is MatterKind.MANY_BALLS for one in proposal_in_words(made, []).matters)
     grams = 1e3 * made.design.shot.mass * 5200.4 / made.design.shot.count
     many = replace(made, design=made.design.changed({"shot.mass_g": grams}))
     fit = SizeFit(1e-3 * ball + 1e-3, 0.99, 0.83, True, 0.0, 100)
@@ -77,7 +77,7 @@ def test_balls_that_are_many_are_told_with_what_pilots_say_of_larger_ones(made: 
     others = (replace(fewer, ball_mm=ball), replace(fewer, ball_mm=ball + 0.5, count=6000), fewer)
     for trials, more in (((), ""), (others, f": {ball + 1:g} mm would suit 83%")):
         matters = proposal_in_words(replace(many, trials=trials), []).matters
-        told = next(one.text for one in matters if one.mark == "MANY BALLS")
+        told = next(one.text for one in matters if one.kind is MatterKind.MANY_BALLS)
         count = many.design.shot.count
         assert count == pytest.approx(5200, rel=1e-3)
         assert told == f", {count:,}, to be dosed and sorted{more}."
@@ -98,7 +98,7 @@ def test_balls_that_are_much_quicker_than_a_long_time_are_told(
     )
     unknown = replace(taken, ball_mm=ball + 2.0, time_to_98=None)
     matters = proposal_in_words(replace(made, trials=(taken, other, unknown)), []).matters
-    told = [one.text for one in matters if one.mark == "QUICKER BALLS"]
+    told = [one.text for one in matters if one.kind is MatterKind.QUICKER_BALLS]
     assert told == [f": of {ball + 1:g} mm, by pilots about 3100 s."] * is_told
 
 
@@ -150,10 +150,8 @@ def test_verbose_has_every_reason_and_every_surface(made: Proposal) -> None:
         ("TURNED BY A DRIVE, at 60 rpm", [], ["TURNED BY A DRIVE, at 60 rpm"]),
     ],
 )
-def test_clauses_in_capitals_are_to_be_settled(
-    reason: str, why: list[str], settle: list[str]
-) -> None:
-    assert clauses(reason) == (why, settle)
+def test_clauses_of_a_kind_are_matters(reason: str, why: list[str], settle: list[str]) -> None:
+    assert clauses(reason) == (why, [*map(matter_of, settle)])
 
 
 def test_a_time_has_the_unit_of_a_timer() -> None:
@@ -165,9 +163,25 @@ def test_a_time_has_the_unit_of_a_timer() -> None:
     ]
 
 
-def test_a_mark_may_begin_with_an_article() -> None:
-    one = matter_of("A HOLE THROUGH THE WALL, not plugged: close it")
-    assert (one.mark, one.text) == ("A HOLE THROUGH THE WALL", ", not plugged: close it.")
+def test_matters_are_listed_by_their_urgency(made: Proposal) -> None:
+    reasons = {
+        **made.reasons,
+        "shot.mass_g": "half a layer; CHARGE IS CUT for the simulation; NO SIZE SUITS ALL, as told",
+        "materials.part": "ALLOY NOT KNOWN, a guess",
+    }
+    told = proposal_in_words(replace(made, reasons=reasons), [])
+    kinds = [one.kind for one in told.matters]
+    assert kinds.index(MatterKind.NO_SIZE) < kinds.index(MatterKind.CHARGE_CUT)
+    assert kinds.index(MatterKind.CHARGE_CUT) < kinds.index(MatterKind.ALLOY)
+    lines = proposal_lines(told, verbose=False)
+    heads = [lines.index(f"{one.in_words}:") for one in Urgency]
+    assert heads == sorted(heads)
+
+
+def test_each_kind_is_known_by_its_own_words() -> None:
+    for kind in MatterKind:
+        assert matter_of(f"{kind}, then more") == Matter(kind, ", then more")
+    assert matter_of("SAE AMS 2430 has it").kind is None
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from chamberopt.chamber.layout.target import surfaces
+from chamberopt.chamber.matters import Urgency
 from chamberopt.cli import main
 from chamberopt.design.load import load_design
 from chamberopt.documents.facts import facts_in_words
@@ -580,10 +581,11 @@ def test_what_is_settled_is_taken_out_of_the_file(opened: Page) -> None:
     expect(listed).to_have_count(2, timeout=WAIT)
     opened.wait("data-checked=reach")
     assert "to be settled" not in (page.locator("#warnings").text_content() or "")
-    listed.first.get_by_text("take balls of 2.5 mm").click()
+    assert page.locator("#settle h3").all_text_contents() == [one.in_words for one in Urgency][:2]
+    listed.last.get_by_text("take balls of 2.5 mm").click()
     expect(page.locator('[id="shot.diameter_mm"]')).to_have_value("2.5")
     page.click("#undo")
-    listed.first.get_by_text("Mark as settled").click()
+    listed.last.get_by_text("Mark as settled").click()
     expect(listed).to_have_count(1, timeout=WAIT)
     expect(listed).to_contain_text("Not masked: ask")
     opened.saved()

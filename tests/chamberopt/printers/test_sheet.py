@@ -17,6 +17,7 @@ from chamberopt.chamber.checks.check import matters
 from chamberopt.chamber.checks.flat_faces import FlatFace
 from chamberopt.chamber.checks.openings import Opening, part_is_ceiling
 from chamberopt.chamber.checks.strips import StripOfTarget
+from chamberopt.chamber.matters import Urgency
 from chamberopt.cli import main
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import NOT_RESOLVED, Estimate
@@ -28,7 +29,7 @@ from chamberopt.design.intensity import WantedIntensity
 from chamberopt.documents.answer import answer_lines
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Document, Section, Sentence, Table
-from chamberopt.documents.report import open_matters, open_warnings
+from chamberopt.documents.report import open_matters, own_warnings
 from chamberopt.documents.sheet import (
     REQUALIFY,
     AsBuilt,
@@ -411,9 +412,9 @@ def test_what_a_holder_bears_is_the_momentum_of_the_impacts(folder: Path) -> Non
     assert push_of_shot(several, arrays) is None
 
 
-@pytest.mark.parametrize(("half_width", "left"), [(50.0, 1), (math.inf, 3)])
+@pytest.mark.parametrize(("half_width", "assumed"), [(50.0, 0), (math.inf, 2)])
 def test_what_the_simulation_has_settled_is_told_no_more(
-    folder: Path, half_width: float, left: int
+    folder: Path, half_width: float, assumed: int
 ) -> None:
     """A pilot had not known the time to 98 %. A design without a time says nothing of it."""
     result = load_result(folder)
@@ -423,10 +424,12 @@ def test_what_the_simulation_has_settled_is_told_no_more(
     record = result.record.model_copy(update={"warnings": warnings})
     told = replace(result, design=design, record=record)
     told.metrics["time_to_98_s"] = Estimate(900.0, half_width)
-    assert len(open_matters(told)) == left
-    assert [text for text in alarms(told) if text.startswith(f"{left} matter")]
-    assert len(open_warnings(told)) == left + 1
-    assert open_warnings(told)[-1] == "another"
+    assert len(open_matters(told)) == 1 + assumed
+    assert [text for text in alarms(told) if text.startswith("1 matter")]
+    assert own_warnings(told) == ["another"]
+    tables = {one.caption: one for one in limit_tables(told)}
+    assert tables[Urgency.BEFORE_BUILDING.in_words].rows == [("", "NOT MASKED: ask.")]
+    assert (Urgency.ASSUMED.in_words in tables) is bool(assumed)
 
 
 def test_the_openings_of_a_later_step_are_told(folder: Path) -> None:
