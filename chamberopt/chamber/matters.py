@@ -23,15 +23,19 @@ class Urgency(IntEnum):
         return TITLES[self]
 
 
-TITLES = ("To be settled before it is built", "To know while setting up", "Assumed, to be confirmed")
+TITLES = (
+    "To be settled before it is built",
+    "To know while setting up",
+    "Assumed, to be confirmed",
+)
 
 
 class MatterKind(StrEnum):
     """What a matter is about: the words that begin its sentence."""
 
     # The target, and what of the part is beside it.
-    BY_SIZE = "CHOSEN BY SIZE ALONE"
-    BY_SHAPE = "CHOSEN BY SHAPE"
+    BY_SIZE = "TARGET CHOSEN BY SIZE ALONE"
+    BY_SHAPE = "TARGET CHOSEN BY SHAPE"
     FILLETS_LEFT = "FILLETS ARE NOT IN THE TARGET"
     FILLETS_NOT_REACHED = "FILLETS ARE LEFT OUT"
     PLACES_LEFT = "PLACES ARE LEFT OUT"
@@ -85,7 +89,7 @@ class MatterKind(StrEnum):
     HARDNESS = "HARDNESS ASSUMED"
     ROUGH_TIME = "TIME KNOWN ROUGHLY"
     TIME_NOT_RESOLVED = "TIME NOT RESOLVED"
-    NOT_MEASURED = "NOT MEASURED"
+    NOT_MEASURED = "TIME NOT MEASURED"
     FEW_DENTS = "TOO FEW DENTS"
 
     @property

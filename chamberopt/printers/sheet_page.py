@@ -393,7 +393,8 @@ def draw_sheet(
     # A drawing of that scale is lower than its room: with less room the letters may be larger.
     tall = drawing_height(chamber, (INNER, min(MOST_DRAWING, room) - CAPTION))
     shown, size, _ = _laid_out(*texts, [CAPTION + tall] * len(SIZES))
-    _drawing(axes, chamber, top, tall, limits, face)
+    drawn = limits, face, clearance_mm
+    _drawing(axes, chamber, top, tall, drawn)
     _content(Writer(axes, size), shown, top - tall - CAPTION)
     if shown is not whole:
         left = [one for one in content if one not in shown]
@@ -401,9 +402,9 @@ def draw_sheet(
     if drawing_scale(chamber, (INNER, tall)) < LEAST_SCALE:
         larger, y = _further_page("Drawing", sheet.name)
         tall = drawing_height(chamber, (INNER, y - FOOT - CAPTION))
-        _drawing(larger, chamber, y, tall, limits, face)
+        _drawing(larger, chamber, y, tall, drawn)
         pages.append(larger)
-    pages += _further_steps(chamber, sheet.name, limits, face)
+    pages += _further_steps(chamber, sheet.name, drawn)
     y = 0.0
     if isinstance(coverage, np.ndarray):
         last, y = _coverage_page(coverage, sheet.name)
@@ -534,35 +535,35 @@ def _in_rows(block: Block, measure: Writer) -> tuple[Written, list[Written]]:
 
 
 def _drawing(
-    axes: Axes, chamber: Chamber, top: float, tall: float, limits: Limits, face: Face | None
+    axes: Axes, chamber: Chamber, top: float, tall: float, drawn: tuple[Limits, Face | None, float]
 ) -> None:
     """Draw a chamber as wide as the page, with its legend below.
 
     Args:
         top, tall: upper edge and height of the drawing [mm].
-        limits, face: those of draw_sheet.
+        drawn: limits, face and clearance of draw_sheet.
     """
-    views = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall), limits, face)
+    views = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall), *drawn)
     Writer(axes, 6.0).write(f"{views} {LEGEND}", MARGIN, top - tall, INNER, colour=DARK_GREY)
 
 
 def _further_steps(
-    chamber: Chamber, name: str, limits: Limits, face: Face | None
+    chamber: Chamber, name: str, drawn: tuple[Limits, Face | None, float]
 ) -> Iterator[Axes]:
     """Yield pages with a drawing of each further step in which the part stands otherwise.
 
     Args:
         name: name of the sheet.
-        limits, face: those of draw_sheet.
+        drawn: limits, face and clearance of draw_sheet.
     """
-    drawn = [chamber.part.vertices]
+    known = [chamber.part.vertices]
     for number, room in enumerate(chamber.steps[1:], start=2):
         posed = room.part.vertices
-        if not any(one.shape == posed.shape and np.allclose(one, posed) for one in drawn):
+        if not any(one.shape == posed.shape and np.allclose(one, posed) for one in known):
             axes, y = _further_page(f"Step {number}", name)
             tall = drawing_height(room, (INNER, MOST_DRAWING))
-            _drawing(axes, room, y, tall, limits, face)
-            drawn.append(posed)
+            _drawing(axes, room, y, tall, drawn)
+            known.append(posed)
             yield axes
 
 

@@ -43,6 +43,7 @@ def draw_chamber(
     size: Point,
     limits: Limits = MappingProxyType({}),
     face: Face | None = None,
+    clearance_mm: float = 0.0,
 ) -> str:
     """Draw sections and plan of a chamber on a page, and return what they are in sentences.
 
@@ -53,6 +54,7 @@ def draw_chamber(
         limits: what the keys of [chamber] may be, for dimensions that show one of them.
         face: on which the chamber stands, whose joints the plan shows, and its rim where it is
             larger than the floor and has room beside the plan.
+        clearance_mm: round the part in its openings.
     """
     (low, high), has_jaws = ends_of(chamber), False
     planes = section_planes(chamber)
@@ -67,7 +69,7 @@ def draw_chamber(
         axis = np.array([plane.right, 2])
         corner = np.array([x + BESIDE + more[0], middle - 0.5 * (tall + more[2]) + 1.0])
         view = View(plane.right, scale, corner, low[axis], high[axis], more)
-        has_jaws |= draw_section(axes, chamber, view, planes, number, limits)
+        has_jaws |= draw_section(axes, chamber, view, planes, number, limits, clearance_mm)
         x = corner[0] + scale * (high - low)[plane.right] + more[1] + BESIDE
         if plane.right == 0:
             under = corner[0]

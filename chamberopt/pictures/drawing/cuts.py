@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.checks.openings import EDGE, find_openings
+from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE
 from chamberopt.geometry.triangles import border_edges, connected_pieces
 from sim_core import computed_once
@@ -54,20 +56,32 @@ def section_planes(chamber: Chamber) -> list[SectionPlane]:
     Of planes that show the part about alike, the one through the chamber's axis is taken, or
     through the part's middle, best along the longer side of the chamber. It is taken too where it
     shows most of the part in one piece, or its two sides alike, as of a ring. Planes that miss the
-    target are taken only if all do.
+    target are taken only if all do, and then planes in which pieces of the part seem to float.
+    There is a second one too, through the axis, where no lid is seen in the first, as the part goes
+    out as wide as the room there.
     """
     size = np.ptp(chamber.vertices, axis=0)
     longer = int(size[1] > size[0] + 1e-3 * SAME)
-    found = [_planes(chamber, right) for right in (longer, 1 - longer)]
-    showing = [[one for one in planes if one.target] for planes in found]
-    found = [planes for planes in showing if planes] or found
+    found = every = [_planes(chamber, right) for right in (longer, 1 - longer)]
+    for shows in (_shows_target, _is_whole):
+        showing = [[one for one in planes if shows(one)] for planes in found]
+        found = [planes for planes in showing if planes] or found
     cuts = [one for planes in found for one in planes]
     most = max(one.area for one in cuts) or 1.0, max(one.target for one in cuts) or 1.0
     best = [_best_cut(planes, most) for planes in found]
     top = max(score for _, score in best)
     best.sort(key=lambda one: (one[1] < AS_GOOD * top, not one[0].is_central))
     planes = [one.plane for one, _ in best]
+    if planes[0].span >= ENOUGH and _hides_lid(chamber, planes[0].right):
+        return [planes[0], every[int(planes[0].right == longer)][0].plane]
     return planes[: 1 if planes[0].span >= ENOUGH else 2]
+
+
+def _hides_lid(chamber: Chamber, right: int) -> bool:
+    """Return whether an opening of the ceiling leaves no lid beside the part along an axis."""
+    room = float(np.ptp(chamber.vertices[:, right]))
+    openings = [one for one in find_openings(chamber) if one.wall == CEILING]
+    return any(one.size[right] > room - EDGE and one.size[1 - right] > EDGE for one in openings)
 
 
 class _Cut(NamedTuple):
@@ -78,7 +92,15 @@ class _Cut(NamedTuple):
     target: float  # length of the target's line [m]
     pieces: int  # in which the part is seen
     is_central: bool  # through the chamber's axis, or through the middle of the part
-    is_even: bool  # as much of the part is on either side of the middle
+    is_even: bool  # as much of the part is on either side of the middle, where nothing is
+
+
+def _shows_target(one: _Cut) -> bool:
+    return one.target > 0.0
+
+
+def _is_whole(one: _Cut) -> bool:
+    return one.pieces == 1 or one.is_even
 
 
 def _best_cut(planes: list[_Cut], most: tuple[float, float]) -> tuple[_Cut, float]:
@@ -98,9 +120,7 @@ def _best_cut(planes: list[_Cut], most: tuple[float, float]) -> tuple[_Cut, floa
     whole = [
         one
         for one in planes
-        if one.is_central
-        and (one.pieces == 1 or one.is_even)
-        and one.plane.span >= ENOUGH * best.plane.span
+        if one.is_central and _is_whole(one) and one.plane.span >= ENOUGH * best.plane.span
     ]
     if not best.is_central and whole:
         best = max(whole, key=score)
@@ -143,11 +163,16 @@ def _turned(lines: np.ndarray) -> np.ndarray:
 
 
 def _is_even(lines: np.ndarray) -> bool:
-    """Return whether the centroid of a cut with lines (k, 2, 2) lies in the middle of its width."""
+    """Return whether a cut with lines (k, 2, 2) has two sides alike, and nothing between them.
+
+    The centroid of those of a ring lies in the middle of their width.
+    """
     if not len(lines):
         return False
     turned, places = _turned(lines), lines[..., 0]
     middle, area = 0.5 * float(places.min() + places.max()), float(turned.sum())
+    if ((places.min(axis=1) < middle) & (places.max(axis=1) > middle)).any():
+        return False
     aside = float(turned @ places.sum(axis=1)) / 3.0 - area * middle
     return abs(aside) < EVEN * abs(area) * float(np.ptp(places))
 

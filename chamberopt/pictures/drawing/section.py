@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chamberopt.chamber.checks.openings import find_openings
+from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.fixture import size_in_words
 from chamberopt.chamber.layout.grip import outside_clamp
 from chamberopt.common.number_text import typeset_plain as plain
@@ -48,6 +50,7 @@ FIRST_ROW, ROWS = 4.0, 4.2
 CROSS = 4.0  # mm on paper, of the lines that cross in the middle of an opening
 MOST_CENTRES = 1  # heights of openings on each side of a section
 LETTER = 1.0  # mm on paper, width of a letter of a name of a holder
+OPENING = 3.0  # mm on paper, from the part to the dimension of the opening above it
 ROOM = "#e8f1f7"
 
 
@@ -58,13 +61,14 @@ def draw_section(
     planes: Sequence[SectionPlane],
     number: int,
     limits: Limits,
+    clearance_mm: float,
 ) -> bool:
     """Draw a section. Return whether jaws are in it, which hold the part outside.
 
     Args:
         planes: planes of all sections.
         number: of this section among them, from 0.
-        limits: those of draw_chamber.
+        limits, clearance_mm: those of draw_chamber.
     """
     at, name = planes[number].at, "AB"[number]
     other = 1 - view.right
@@ -88,7 +92,8 @@ def draw_section(
     above += float(top)
     across_line(axes, (axis_at, y - FACE - 1.0), (axis_at, above + 1.0))
     words = f"{name}–{name}: {'xy'[view.right]} to the right, z up"
-    label(axes, view.corner[0], above + 2.5, words)
+    is_dimensioned = _draw_ceiling(axes, chamber, view, above, clearance_mm)
+    label(axes, view.corner[0], above + 2.5 + OPENING * is_dimensioned, words)
     # The sonotrode is a band below its mean face, at z = 0.
     face_wide = 0.0
     face = 1e3 * lines[tags == TAG_SONOTRODE][..., 0]
@@ -142,6 +147,28 @@ def _as_far(height: float, lowest: float, limits: Limits) -> str:
     low, high = (height + end - value for end in ends)
     shown = plain(round(height, 1))
     return toleranced(shown, height, low, high) if high > low else shown
+
+
+def _draw_ceiling(
+    axes: Axes, chamber: Chamber, view: View, above: float, clearance_mm: float
+) -> bool:
+    """Dimension the opening of the ceiling above a section. Return whether there is one.
+
+    Args:
+        above: height on the page of the part's upper end [mm].
+        clearance_mm: round the part in it.
+    """
+    room = float((view.high - view.low)[0])
+    for one in find_openings(chamber):
+        wide = 1e3 * one.size[view.right] + 2.0 * clearance_mm
+        if one.wall == CEILING and one.form in ("rectangle", "round") and wide < room - WIDER:
+            middle, top = 1e3 * one.place[view.right], float(view.high[1])
+            ends = view.place([[middle - 0.5 * wide, top], [middle + 0.5 * wide, top]])
+            (low, y), (high, _) = ends.tolist()
+            text = f"{'Ø ' * (one.form == 'round')}{plain(round(wide, 1))}"
+            dimension(axes, (low, y), (high, y), y - above - OPENING, text)
+            return True
+    return False
 
 
 def _draw_centres(

@@ -69,7 +69,7 @@ def test_what_repeats_is_a_target_if_it_is_a_large_ring(
     mesh = bosses(ring, wide_mm)
     reason = propose_target(mesh, surfaces(mesh), []).reason
     assert said in reason
-    assert "; CHOSEN BY S" in reason
+    assert "; TARGET CHOSEN BY S" in reason
 
 
 def box_with(names: dict[str, int | tuple[int, ...]]) -> PartMesh:

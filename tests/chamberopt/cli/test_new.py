@@ -273,7 +273,7 @@ def test_a_pilot_that_cannot_run_leaves_the_starts_and_says_so(
     monkeypatch.setattr("chamberopt.workflows.propose.draw_target", lambda *_: "no picture")
     assert main(["new", "box.stl", "--unit", "mm"]) == 0
     assert "warning: no pilot, treatment and simulated time are starts" in capfd.readouterr().err
-    assert "NOT MEASURED by a pilot, a start" in Path("box/design.toml").read_text("utf-8")
+    assert "TIME NOT MEASURED by a pilot, a start" in Path("box/design.toml").read_text("utf-8")
 
     measured = Measured(1e5, 1e4, 250.0, True, 60.0, True, 0.01, 5e-3, 6.4, 200.0)
     monkeypatch.setattr("chamberopt.workflows.propose.measure_budget", lambda *_: measured)

@@ -36,7 +36,7 @@ def test_all_that_is_to_be_settled_is_one_list(made: Proposal) -> None:
     text = "\n".join(proposal_lines(proposal_in_words(made, left_out), verbose=False))
     told, _, settle = text.partition("\nTo be settled before it is built:\n")
     assert "ALLOY NOT KNOWN" in settle
-    assert "NOT MEASURED" in settle
+    assert "TIME NOT MEASURED" in settle
     assert "NOT MASKED" in settle
     assert not any(mark in told for mark in ("ALLOY NOT", "NOT MEASURED", "NOT MASKED"))
     assert told.startswith("Peen face 1 (")

@@ -68,7 +68,7 @@ def test_a_part_becomes_a_design_that_opens(front: Served, tmp_path: Path) -> No
     assert now["exit"] == 0, now["lines"]
     told = now["proposal"]
     assert {row["name"] for row in told["rows"]} >= {"target", "chamber", "balls", "time"}
-    assert told["matters"][0]["mark"] == "Chosen by size alone"
+    assert told["matters"][0]["mark"] == "Target chosen by size alone"
     assert sum(one["is_target"] for one in told["choices"]) == 1
     assert now["picture"][0] == "part/design.png"
     design = load_design(tmp_path / "part" / "design.toml")

@@ -418,7 +418,11 @@ def test_what_the_simulation_has_settled_is_told_no_more(
 ) -> None:
     """A pilot had not known the time to 98 %. A design without a time says nothing of it."""
     result = load_result(folder)
-    texts = ["TIME KNOWN ROUGHLY, to ± 57%: simulate", "NOT MASKED: ask", "NOT MEASURED by a pilot"]
+    texts = [
+        "TIME KNOWN ROUGHLY, to ± 57%: simulate",
+        "NOT MASKED: ask",
+        "TIME NOT MEASURED by a pilot",
+    ]
     design = result.design.changed({"to_settle": texts})
     warnings = (*matters(design), "another")
     record = result.record.model_copy(update={"warnings": warnings})

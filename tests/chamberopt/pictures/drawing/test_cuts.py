@@ -36,6 +36,22 @@ def test_the_section_shows_a_part_in_one_piece_if_its_middle_does(thick: float) 
     assert (plane.right, plane.at) == (0, pytest.approx(0.0, abs=1e-9))
 
 
+def test_no_piece_of_the_part_floats_in_the_section() -> None:
+    """A web across y with a foot and a head along y, wider than the web on both sides.
+
+    The flanks of the head are peened. Planes along y through them show head and foot apart.
+    """
+    bounds = [((-12, -25, 0), (12, 25, 6)), ((-12, -25, 14), (12, 25, 20))]
+    bounds.append(((-4, -25, 5), (4, 25, 15)))
+    body = trimesh.boolean.union([trimesh.creation.box(bounds=1e-3 * np.array(x)) for x in bounds])
+    middle = 1e3 * body.triangles_center
+    beside = (np.abs(body.face_normals[:, 2]) > 0.9) & (np.abs(middle[:, 0]) > 4.1)
+    chamber = chamber_round(body, beside & (np.abs(middle[:, 2] - 10.0) < 4.1))
+    assert [(one.right, one.at) for one in section_planes(chamber)] == [
+        (0, pytest.approx(0.0, abs=1e-9))
+    ]
+
+
 def test_the_section_shows_the_profile_that_is_peened() -> None:
     """Four ribs along y, the longer side: a plane along them shows a block."""
     bounds = [((-15e-3, -17e-3, 0.0), (15e-3, 17e-3, 10e-3))]

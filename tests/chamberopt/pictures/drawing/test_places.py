@@ -49,6 +49,17 @@ def texts_of(
     return [one.get_text() for one in axes.texts], found
 
 
+def test_a_second_section_shows_the_lid_beside_a_part_as_wide_as_the_room(tmp_path: Path) -> None:
+    """A plate of 24 mm along x goes out of the ceiling, and over the walls along y."""
+    plate = trimesh.creation.box((24.0, 30.0, 25.0))
+    chamber = room_with(plate, tmp_path, (0.0, 0.0), holder={"kind": "bore", "clearance_mm": 0.2})
+    assert [one.right for one in section_planes(chamber)] == [1, 0]
+    axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
+    told = draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0), clearance_mm=0.2)
+    assert told.startswith("Sections A–A and B–B")
+    assert [one.get_text() for one in axes.texts].count("24.4") == 1
+
+
 def test_a_bar_through_a_side_wall_has_its_axis_and_its_end_dimensioned(tmp_path: Path) -> None:
     """A bar of 6 mm along x, from x = -9 to 27 mm, 5 mm beside the axis of the room."""
     chamber = room_with(trimesh.creation.box((36.0, 6.0, 6.0)), tmp_path, (9.0, 5.0))
