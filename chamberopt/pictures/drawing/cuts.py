@@ -56,14 +56,14 @@ def section_planes(chamber: Chamber) -> list[SectionPlane]:
     Of planes that show the part about alike, the one through the chamber's axis is taken, or
     through the part's middle, best along the longer side of the chamber. It is taken too where it
     shows most of the part in one piece, or its two sides alike, as of a ring. Planes that miss the
-    target are taken only if all do, and then planes in which pieces of the part seem to float.
+    target are taken only if all do, and then planes off the middle with pieces that seem to float.
     There is a second one too, through the axis, where no lid is seen in the first, as the part goes
     out as wide as the room there.
     """
     size = np.ptp(chamber.vertices, axis=0)
     longer = int(size[1] > size[0] + 1e-3 * SAME)
     found = every = [_planes(chamber, right) for right in (longer, 1 - longer)]
-    for shows in (_shows_target, _is_whole):
+    for shows in (_shows_target, lambda one: one.is_central or _is_whole(one)):
         showing = [[one for one in planes if shows(one)] for planes in found]
         found = [planes for planes in showing if planes] or found
     cuts = [one for planes in found for one in planes]
