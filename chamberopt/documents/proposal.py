@@ -15,6 +15,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from chamberopt.chamber.checks.fillets import OF_FILLET, OF_SLOT
+from chamberopt.chamber.checks.openings import find_openings, walls_end_at
 from chamberopt.chamber.layout.target import area_in_mm2
 from chamberopt.chamber.matters import Matter, MatterKind
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
@@ -273,6 +274,9 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     yield "pose", pose, ("part.rotate_deg", "effects.part_turn")
     chamber = dict(tables["chamber"])
     shape = chamber.pop("shape", "cylinder")
+    end = walls_end_at(find_openings(made.chamber))
+    if end is not None:  # they are built so high; those of the file go on into the part
+        chamber["height_mm"] = round(1e3 * end, 2)
     sizes = ", ".join(f"{in_words(key)} {value:g}" for key, value in _numbers(chamber))
     yield "chamber", f"{shape}: {sizes} mm", tuple(f"chamber.{key}" for key in chamber)
     face = design.sonotrode.face or made.sonotrode.face

@@ -110,7 +110,10 @@ def exposed_target(result: Result) -> str:
     """Return a text with the area and reachable share of a target inside the chamber, else ""."""
     area = result.record.chamber.target_exposed_area_mm2
     share = per_cent(result.record.field.reachable_share)
-    return f"{plain(area)} mm² in the chamber; the shot can reach {share} of it" if area else ""
+    left = ", without what no ball touches" if result.design.part.target.reachable else ""
+    return (
+        f"{plain(area)} mm² in the chamber{left}; the shot can reach {share} of it" if area else ""
+    )
 
 
 def _constraints(result: Result) -> list[str]:

@@ -68,9 +68,9 @@ def render_coverage(job: dict[str, Any]) -> None:
             add_part(plotter, part, limits)
             add_edges(plotter, part.surface)
 
-        marks = np.reshape(job["marks"], (-1, 6))
+        marks = [(str(k), np.reshape(one, (1, 6))) for k, one in enumerate(job["marks"], 1)]
         panels = [
-            one._replace(marks=seen_marks(marks, part.surface, one.view.frame[2]))
+            one._replace(marks=seen_marks(marks, part.surface, one.view))
             for one in part_panels(add, part.inside, part.surface, chamber, views)
         ]
         for first in range(0, len(panels), job["columns"]):

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from chamberopt.design.shape_surface import TAG_PART, is_sonotrode
+from chamberopt.chamber.checks.openings import EDGE
+from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.pictures.actors import add_chamber
 from chamberopt.pictures.camera import (
     cells_of,
@@ -19,8 +20,8 @@ from chamberopt.pictures.camera import (
     view_frame,
 )
 from chamberopt.pictures.picture_page import Dimension, Mark, Panel
-from chamberopt.pictures.view import render_view
-from chamberopt.results.vtp_files import Surface
+from chamberopt.pictures.view import View, render_view
+from chamberopt.results.vtp_files import MM, Surface
 
 ROUND = (
     0.02  # a chamber is round whose vertices are this close to a circle, as shares of its radius
@@ -33,6 +34,7 @@ WHOLE = 1.3  # longest part that is shown whole, over the length of its target
 NEAR_CAPTIONS = "the target", "what is hidden there"
 ALIKE_CAPTION = "the target, alike from the other side"
 ABOVE = 1e-3  # height over the surface from which a place is looked for, over the part's size
+MARK = 30.0  # pixels between texts, and from the edge of a view
 ALIKE = 3.0  # mean difference of two images, of 255, up to which they show the same
 
 Add = Callable[[Any], None]
@@ -123,20 +125,27 @@ def near_panels(
     ]
 
 
-def seen_marks(marks: np.ndarray, part: Surface, eye: np.ndarray) -> list[Mark]:
-    """Return the places that are seen on a part, each with its number, from 1 on.
+def seen_marks(marks: Sequence[tuple[str, np.ndarray]], part: Surface, view: View) -> list[Mark]:
+    """Return texts at places that are seen on a part, each at the first such place of its own.
 
     Args:
-        marks: places [mm] and the normals there, (n, 6).
-        eye: direction to the eye.
+        marks: texts, each with places [mm] and the normals there, (k, 6), the best place first.
     """
-    size, found = float(part.length), []
-    for number, one in enumerate(marks, 1):
-        place, normal = one[:3], one[3:]
-        start = place + ABOVE * size * normal
-        hits = part.ray_trace(start, start + 2.0 * size * eye, first_point=True)[0]
-        if normal @ eye > 0.0 and not len(hits):
-            found.append(Mark(place, str(number)))
+    size, eye, found, taken = float(part.length), view.frame[2], list[Mark](), list[np.ndarray]()
+    high, wide = view.image.shape[:2]
+    for text, places in marks:
+        for one in places:
+            place, normal = one[:3], one[3:]
+            at = view.pixels(place[None])[0]
+            is_free = all(np.linalg.norm(at - other) > MARK for other in taken)
+            if normal @ eye <= 0.0 or not is_free or not (MARK < at[0] < wide - MARK):
+                continue
+            start = place + ABOVE * size * normal
+            hits = part.ray_trace(start, start + 2.0 * size * eye, first_point=True)[0]
+            if not len(hits) and MARK < at[1] < high - MARK:
+                found.append(Mark(place, text))
+                taken.append(at)
+                break
     return found
 
 
@@ -177,12 +186,21 @@ def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:
         feet = middle + 0.5 * size * np.array([(x, y, -1.0) for x in (-1, 1) for y in (-1, 1)])
     across = feet @ frame[0]
     foot = feet[across.argmin() if left else across.argmax()]
-    found.append(_upright(foot, low[2], high[2], 1))
+    found.append(_upright(foot, low[2], _walls_end(chamber), 1))
     if low[2] < lowest < high[2] - 1e-6 * size[2]:
         found.append(_upright(foot, low[2], lowest, 0))
     else:
         found[-1] = found[-1]._replace(row=0)
     return found
+
+
+def _walls_end(chamber: Surface) -> float:
+    """Return the height [mm] at which walls end: at the ceiling, or on a part just below it."""
+    faces, tag = np.asarray(chamber.regular_faces), np.asarray(chamber["tag"])
+    shared = np.intersect1d(faces[tag == TAG_PART], faces[tag == TAG_WALL])
+    high = float(chamber.bounds[5])
+    heights = np.asarray(chamber.points)[shared, 2]
+    return float(min(heights[heights > high - EDGE * MM], default=high))
 
 
 def _upright(foot: np.ndarray, low: float, high: float, row: int) -> Dimension:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -12,6 +13,9 @@ import numpy as np
 from chamberopt.chamber.build import without_specks
 from chamberopt.chamber.checks.check import touched
 from chamberopt.chamber.flexure import softness_of_part
+from chamberopt.chamber.part import chosen_on_part
+from chamberopt.design.part import Selection
+from chamberopt.geometry.triangles import area_vectors, unit_vectors
 from chamberopt.pictures.actors import FAULT, NO_RENDER, add_edges, body_meanings
 from chamberopt.pictures.camera import cells_of, near_directions, near_views, pushed_back, seen_area
 from chamberopt.pictures.charts.colours import KINDS
@@ -22,6 +26,7 @@ from chamberopt.pictures.panels import (
     choose_views,
     near_panels,
     part_panels,
+    seen_marks,
     without_twin,
 )
 from chamberopt.pictures.picture_page import Panel, Row, write_page
@@ -31,6 +36,7 @@ from chamberopt.results.vtp_files import MM, Surface, cavity_surface, pyvista, s
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.layout.target import Surface as Choosable
     from chamberopt.design.load import Design
 
 
@@ -53,18 +59,25 @@ BAND_COLOURS = {
     4: ("#c7e9c0", "0.9 to 0.98"),
     5: COLOURS[MARKED],
 }
+FACE = re.compile(r"face (\d+)")  # the name of a face without one in its file
+MOST_NUMBERED, MOST_PLACES = 9, 24  # faces that bear their numbers, and places that are tried
+LEAST_BESIDE = 0.1  # share of a face beside the target, below which it bears no number
+NUMBERED = "numbers: “face 1” and so on; of several faces alike, one bears it"
 CLEAR = 0.05  # mm: what stands out of the room by less does not
 ALL = 0.999  # share of the target's area from which it is wholly in the chamber
 OPPOSITE = np.array([(1.0, -1.6, 0.7), (-1.0, 1.6, -0.7)])
 
 
-def draw_target(design: Design, chamber: Chamber, screenshot: Path) -> str:
+def draw_target(
+    design: Design, chamber: Chamber, screenshot: Path, known: Sequence[Choosable] = ()
+) -> str:
     """Draw the part with its target, and mark triangles of the target that are out of reach.
 
     With steps, the part stands as in the first, and what is marked is out of reach in all of them.
     Each further pose has a view in the chamber.
 
-    Where the part is thin, further views show how soft it is.
+    Where the part is thin, further views show how soft it is. Faces of `known` that have a number
+    bear it.
 
     Return in words where the picture is, or why there is none.
     """
@@ -81,8 +94,33 @@ def draw_target(design: Design, chamber: Chamber, screenshot: Path) -> str:
         chamber=chamber,
         softness=softness_of_part(design, part),
         is_held_outside=design.holder is not None and design.holder.kind == "bore",
+        marks=_numbered(design, chamber, known),
     )
     return remark or f"picture in {screenshot}"
+
+
+def _numbered(
+    design: Design, chamber: Chamber, known: Sequence[Choosable]
+) -> list[tuple[str, np.ndarray]]:
+    """Return the number of each numbered face, and places on it, those near its middle first.
+
+    The places are in mm, each with the normal there, (k, 6).
+    """
+    part, found = chamber.part, []
+    middles = part.vertices[part.triangles].mean(axis=1)
+    normals = unit_vectors(area_vectors(part.vertices, part.triangles))
+    for one in known:
+        if (number := FACE.fullmatch(one.name)) and len(found) < MOST_NUMBERED:
+            chosen = chosen_on_part(design, Selection.model_validate(one.keys), "")
+            rows = np.flatnonzero(chosen & ~part.target)
+            if part.area[rows].sum() < LEAST_BESIDE * part.area[chosen].sum():
+                continue
+            middle = np.average(middles[rows], axis=0, weights=part.area[rows])
+            rows = rows[np.linalg.norm(middles[rows] - middle, axis=1).argsort()]
+            share = part.area[rows].cumsum() / part.area[rows].sum()  # up to each place
+            rows = rows[np.searchsorted(share, (np.arange(MOST_PLACES) + 0.5) / MOST_PLACES)]
+            found.append((number[1], np.hstack([MM * middles[rows], normals[rows]])))
+    return found
 
 
 def draw_part(
@@ -95,6 +133,7 @@ def draw_part(
     chamber: Chamber | None = None,
     softness: np.ndarray | None = None,
     is_held_outside: bool = False,
+    marks: Sequence[tuple[str, np.ndarray]] = (),
 ) -> str | None:
     """Draw a part with its target in its chamber, or with its faults.
 
@@ -110,6 +149,7 @@ def draw_part(
         softness: restitution of the part over that of a rigid one, shape (n,), where it is thin.
             A second row of views shows it on the target.
         is_held_outside: True if the part is clamped where it stands out of the chamber.
+        marks: numbers of faces, each with places on it, as of `seen_marks`.
     Returns:
         None, or one line that says why there is no picture.
     Raises:
@@ -121,7 +161,7 @@ def draw_part(
     edges = np.zeros((0, 2, 3)) if edges is None else edges
     job = {"title": title, "corners": corners * MM, "marked": marked & ~missed, "missed": missed,
            "edges": edges * MM, "chamber": chamber, "softness": softness,
-           "is_held_outside": is_held_outside}  # fmt: skip
+           "is_held_outside": is_held_outside, "marks": [*marks]}  # fmt: skip
     return draw_in_subprocess(render_part, job, path)
 
 
@@ -141,13 +181,17 @@ def render_part(job: dict[str, Any]) -> None:
         legend = [*body_meanings([job["chamber"]]), *legend]
     legend = legend if not len(edges) else [(FAULT, "what the message tells of")]
     panels = _panels(job, part, shown, COLOURS, [(one, *_coloured(one, kinds)) for one in poses])
+    of_pose = panels[:1] if poses else panels  # in which the part stands as in the first
+    marked_ones = [one._replace(marks=seen_marks(job["marks"], part, one.view)) for one in of_pose]
+    panels = [*marked_ones, *panels[len(of_pose) :]]
     rows = [Row(job["title"], panels)]
     if softness is not None:
         bands = np.where(marked | missed, 1 + np.searchsorted(BANDS, softness, "right"), PLAIN)
         part, shown = _coloured(job, bands, beyond=False)
         rows.append(Row(f"{job['title']}: {SOFTER}", _panels(job, part, shown, BAND_COLOURS)))
         legend += [one for k in np.unique(bands) if (one := BAND_COLOURS[k]) not in legend]
-    write_page(job["picture"], rows, legend, remarks=[f"part as it stands: {size_text(part)}"])
+    remarks = [f"part as it stands: {size_text(part)}", *[NUMBERED] * bool(job["marks"])]
+    write_page(job["picture"], rows, legend, remarks=remarks)
 
 
 def _further_poses(job: dict[str, Any]) -> list[dict[str, Any]]:

@@ -202,13 +202,13 @@ def _written(first: Proposal, pilots: _Pilots, folder: Path) -> Proposed:
     """Write what pilots make of a first proposal into a folder."""
     teller = pilots.teller
     pilots.begin(PICTURE_OF)  # before the pilots, so that it can be looked at meanwhile
-    teller.tell(draw_target(first.design, first.chamber, folder / PICTURE))
+    teller.tell(draw_target(first.design, first.chamber, folder / PICTURE, first.known))
     made = pilots.improve(first) if pilots.wishes.pilot else first
     pilots.begin(WRITING)
     made = with_harmless_ranges(made)
     if made.chamber is not first.chamber:
         remove_file(folder / PICTURE)  # of the first proposal
-        told = draw_target(made.design, made.chamber, folder / PICTURE)
+        told = draw_target(made.design, made.chamber, folder / PICTURE, made.known)
         if not (folder / PICTURE).is_file():
             teller.tell(told)
     left_out = find_left_out(made)

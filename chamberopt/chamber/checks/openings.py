@@ -81,6 +81,15 @@ def part_is_ceiling(chamber: Chamber) -> bool:
     return bool(highest > chamber.height - THIN) and CEILING not in surface_names(chamber)
 
 
+def walls_end_at(openings: Sequence[Opening]) -> float | None:
+    """Return the height [m] at which side walls end on the part that lies on them; None if none do.
+
+    There the room is as high as the walls, and the part begins.
+    """
+    ends = [one for one in openings if one.wall != CEILING and one.is_end]
+    return min((one.place[2] - 0.5 * one.size[1] for one in ends), default=None)
+
+
 def mounting(part: Part, opening: Opening, clear: float) -> Mounting:
     """Return how a part comes into an opening of a wall.
 

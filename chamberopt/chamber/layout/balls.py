@@ -294,7 +294,7 @@ def _best_of(free: Sequence[SizeFit], fits: Sequence[SizeFit]) -> tuple[SizeFit,
     suited = [one for one in reach if one.suits]
     if suited and (suited[-1].count <= MANY or suited[-1].diameter >= as_good.diameter):
         best = suited[-1]
-        text = f"touches {best.touched:.0%} of the target"
+        text = f"touches {best.touched:.0%} of the target as chosen"
         larger = [one for one in fits if one.diameter > best.diameter]
         if any(not one.suits for one in larger):
             text += ", at most half the radius of its fillets and a quarter of its slots"

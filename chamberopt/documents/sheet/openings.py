@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chamberopt.chamber.checks.openings import EDGE, PLATE, thin_ribs
+from chamberopt.chamber.checks.openings import EDGE, PLATE, thin_ribs, walls_end_at
 from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.fixture import plugs_in_words, size_in_words
 from chamberopt.documents.sheet.rows import MOST_ROWS, AsBuilt, Row, first_rows
@@ -55,7 +55,7 @@ def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         beyond = _beyond(way, openings, held, how)
         cut = opening_in_words(way, clearance_of(result))
         beyond += _across(result, way)
-        rows.append(("opening", f"{cut} at {place_of(way)} mm{frame}; {beyond}"))
+        rows.append(("opening", f"{cut} at {place_of(way, openings)} mm{frame}; {beyond}"))
     yield from first_rows(rows, "openings")
     if ribs := thin_ribs(openings):
         between = " and ".join(
@@ -131,15 +131,6 @@ def clearance_of(result: Result) -> float:
     return 0.0 if holder is None else holder.clearance
 
 
-def walls_end_at(openings: Sequence[Opening]) -> float | None:
-    """Return the height [m] at which side walls end on the part that lies on them; None if none do.
-
-    There the room is as high as the walls, and the part begins.
-    """
-    ends = [one for one in openings if one.wall != CEILING and one.is_end]
-    return min((one.place[2] - 0.5 * one.size[1] for one in ends), default=None)
-
-
 def lid_in_words(built: AsBuilt) -> str:
     """Return in words how the chamber opens: by its lid, the part, or where its walls are split."""
     openings, mountings = built.openings, built.mountings
@@ -178,9 +169,18 @@ def _side(length: float) -> str:
     return plain(round(1e3 * length, 1) + 0.0)
 
 
-def place_of(one: Opening) -> str:
-    """Return the middle of an opening [mm] as text."""
-    return f"({', '.join(map(_side, one.place))})"
+def place_of(one: Opening, openings: Sequence[Opening]) -> str:
+    """Return the middle of an opening [mm] as text.
+
+    Its height is that of the walls where they end on the part, as that is what is built.
+
+    Args:
+        openings: all of the same chamber.
+    """
+    x, y, z = one.place
+    end = walls_end_at(openings)
+    at_end = end is not None and (one.is_end or one.wall == CEILING)
+    return f"({', '.join(map(_side, (x, y, end if at_end and end else z)))})"
 
 
 def _height_of(one: Opening) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.chamber.checks.openings import walls_end_at
 from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.layout.pose import axis_down
 from chamberopt.chamber.layout.shot_material import iron_of_walls
@@ -24,7 +25,6 @@ from chamberopt.documents.sheet.openings import (
     lid_in_words,
     opening_in_words,
     place_of,
-    walls_end_at,
 )
 from chamberopt.documents.sheet.rows import (
     AsBuilt,
@@ -140,8 +140,7 @@ def part_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         speed = swing if turn.rpm is None else f"{plain(turn.rpm)} turns a minute"
         yield "turns", f"{speed} about the file's axis ({axis})"
     if area := exposed_target(result):
-        without = ", without what no ball touches" if part.target.reachable else ""
-        yield "target", f"{area}{without}"
+        yield "target", area
     # A strip is told in a row of its own.
     chosen = part.target.model_copy(update={} if strip is None else {"box_mm": None})
     if words := for_the_shop(chosen.in_words):
@@ -317,7 +316,10 @@ def step_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         yield "", "Tables and the drawing here are of the first step; the others differ from it:"
     yield from (("", one.text) for one in answer_lines(result) if one.about == "step")
     first, *others = (
-        [f"{opening_in_words(one, clearance_of(result))} at {place_of(one)} mm" for one in openings]
+        [
+            f"{opening_in_words(one, clearance_of(result))} at {place_of(one, openings)} mm"
+            for one in openings
+        ]
         for openings in (built.openings, *built.later)
     )
     for number, found in enumerate(others, start=2):

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from chamberopt.pictures.camera import view_frame
 from chamberopt.pictures.coverage import coverage_bar, draw_coverage
 from chamberopt.pictures.panels import seen_marks
+from chamberopt.pictures.view import View
 from chamberopt.results.vtp_files import pyvista
 from tests.helpers.opengl import needs_opengl
 
@@ -42,12 +44,23 @@ def test_one_below_the_other(case: tuple, tmp_path: Path) -> None:
 
 
 def test_numbers_stand_where_their_places_are_seen() -> None:
-    """Of a table, the top is seen from above, and under it the foot from the side alone."""
+    """Of a table, the top is seen from above, and under it the foot from the side alone.
+
+    The first place of the top lies inside of it and is never seen.
+    """
     top = pyvista().Box((-10.0, 10.0, -10.0, 10.0, 8.0, 10.0)).triangulate()
     table = top + pyvista().Box((-2.0, 2.0, -2.0, 2.0, 0.0, 8.0)).triangulate()
-    marks = np.array([[0.0, 5.0, 10.0, 0.0, 0.0, 1.0], [2.0, 0.5, 4.0, 1.0, 0.0, 0.0]])
+    marks = [
+        ("1", np.array([[0.0, 0.0, 8.0, 0.0, 0.0, 1.0], [0.0, 5.0, 10.0, 0.0, 0.0, 1.0]])),
+        ("2", np.array([[2.0, 0.5, 4.0, 1.0, 0.0, 0.0]])),
+    ]
+
+    def seen_from(eye: tuple[float, float, float]) -> View:
+        frame, image = view_frame(np.array(eye)), np.zeros((400, 400, 3), dtype=np.uint8)
+        return View(image, frame, np.array([-20.0, 20.0]), 0.1)
+
     seen = {
-        way: [one.text for one in seen_marks(marks, table, np.array(eye))]
+        way: [one.text for one in seen_marks(marks, table, seen_from(eye))]
         for way, eye in {
             "above": (0.0, 0.0, 1.0), "side": (1.0, 0.0, 0.0), "steep": (0.3, 0.0, 0.95),
             "below": (0.0, 0.0, -1.0),
