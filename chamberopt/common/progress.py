@@ -213,7 +213,8 @@ def _log_lines(what: str, stream: TextIO) -> Progress:
         found = "" if best is None else f", best {best:.4f}"
         left = (now - first[0]) * (total - done) / (done - first[1])
         known = done - first[1] >= min(FEW, FEW_SHARE * total)  # the first may be slow, as resumed
-        time_left = f", about {left:.0f} s left" if known else ""
+        # Less than a second is a step whose first part was quick, not one that is about to end.
+        time_left = f", about {left:.0f} s left" if known and left >= 1.0 else ""
         print(f"{what}: {int(done):,} of {total:,}{found}{time_left}", file=stream, flush=True)
 
     return write

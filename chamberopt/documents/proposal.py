@@ -213,8 +213,11 @@ def _sentence(made: Proposal) -> str:
         count = made.settings
         one = f"in setting {made.strips.chosen + 1} of {count}"
         strips = f", {f'in each of {count} settings' if made.strips.are_alike else one}"
+    target = _in_short(one_line(_target(made)))
+    if any(one.name == target and one.beside_mm for one in made.known):
+        target = f"the welds ({target})"
     return (
-        f"Peen {_in_short(one_line(_target(made)))} ({area}{strips}) of "
+        f"Peen {target} ({area}{strips}) of "
         f"{one_line(design.part.mesh_path.name)} for {_time(made)} with {balls}, the sonotrode at "
         f"{design.sonotrode.zero_to_peak_um:g} µm zero-to-peak.{_intensity(made)}"
     )

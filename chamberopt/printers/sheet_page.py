@@ -84,6 +84,7 @@ FOOT = MARGIN + 2.0 * ROW + 3.0  # mm, where the content ends
 RED = "#C00000"
 VIEWS_A_ROW = 2  # of the picture of the coverage, where no outlines are below it on its page
 NO_COVERAGE = "No page shows the coverage by place: {}."
+COVERAGE_HEAD = 20.0  # mm, of title and sentences above the picture of the coverage
 COVERAGE = (
     "Share of the surface that is dented after the treatment time, simulated, in windows round "
     "each place. Numbers: where to look, see Acceptance; one that no view shows is hidden."
@@ -363,7 +364,8 @@ def draw_sheet(
     """Return a process sheet as figures of its pages.
 
     The first page has a heading, sentences in red, a drawing of the chamber and the content. Where
-    its scale is small, a page of its own has a larger one. Each further step in which the part
+    its scale is small, a page of its own has a larger one, and under it the coverage by place if
+    there is room. Each further step in which the part
     stands otherwise has a page with its drawing. The last pages have the coverage by place, and the
     outlines of openings. Each page has the title block at its foot.
 
@@ -399,16 +401,18 @@ def draw_sheet(
     if shown is not whole:
         left = [one for one in content if one not in shown]
         pages += _further_pages(further, left, sheet.name)
+    under: tuple[Axes, float] | None = None
     if drawing_scale(chamber, (INNER, tall)) < LEAST_SCALE:
         larger, y = _further_page("Drawing", sheet.name)
         tall = drawing_height(chamber, (INNER, y - FOOT - CAPTION))
         _drawing(larger, chamber, y, tall, drawn)
         pages.append(larger)
+        under = larger, y - tall - CAPTION
     pages += _further_steps(chamber, sheet.name, drawn)
     y = 0.0
     if isinstance(coverage, np.ndarray):
-        last, y = _coverage_page(coverage, sheet.name)
-        pages.append(last)
+        last, y = _coverage_page(coverage, sheet.name, under)
+        pages += [last] * (last not in pages)
     if openings:
         if y - FOOT < LEAST_OPENINGS:
             last, y = _further_page("Openings", sheet.name)
@@ -567,14 +571,23 @@ def _further_steps(
             yield axes
 
 
-def _coverage_page(picture: np.ndarray, name: str) -> tuple[Axes, float]:
+def _coverage_page(
+    picture: np.ndarray, name: str, under: tuple[Axes, float] | None = None
+) -> tuple[Axes, float]:
     """Return a page with the picture of the coverage, and the height of its bottom [mm].
 
     It is as wide as the page if it is low enough.
+
+    Args:
+        under: a page and the height of its bottom [mm], to which it goes if that has room for it.
     """
-    axes, y = _further_page("Coverage by place", name)
+    title, (rows, columns) = "Coverage by place", picture.shape[:2]
+    if under is not None and under[1] - FOOT > COVERAGE_HEAD + INNER * rows / columns:
+        axes, y = under
+        y = Writer(axes, 12.0).write(title, MARGIN, y, INNER, bold=True) - 3.0
+    else:
+        axes, y = _further_page(title, name)
     y = Writer(axes, 7.0).write(COVERAGE, MARGIN, y, INNER) - 3.0
-    rows, columns = picture.shape[:2]
     size = np.array([columns, rows]) * min(INNER / columns, (y - FOOT) / rows)
     axes.imshow(
         picture, extent=(MARGIN, MARGIN + size[0], y - size[1], y), interpolation="antialiased"

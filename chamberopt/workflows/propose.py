@@ -201,7 +201,8 @@ def write_proposal(
 def _written(first: Proposal, pilots: _Pilots, folder: Path) -> Proposed:
     """Write what pilots make of a first proposal into a folder."""
     teller = pilots.teller
-    pilots.begin(PICTURE_OF)  # before the pilots, so that it can be looked at meanwhile
+    pilots.begin(PICTURE_OF)  # before the pilots: to be looked at meanwhile, or if they are killed
+    write_text(folder / DESIGN, design_text(first, folder, find_left_out(first)))
     teller.tell(draw_target(first.design, first.chamber, folder / PICTURE, first.known))
     made = pilots.improve(first) if pilots.wishes.pilot else first
     pilots.begin(WRITING)

@@ -50,10 +50,10 @@ WHOLE, WHOLE_OF_BLOCKS = 1.25, 1.1
 def of_blocks(ball: float) -> str:
     """Return what is said of a floor of several sonotrodes, for a diameter of the balls [m]."""
     return (
-        f"{MatterKind.SEVERAL_SONOTRODES}: the floor is several side by side, which must vibrate "
-        "in phase and alike: settle with their maker how they are driven and tuned for that, and "
-        "if they cannot be, peen the target a length at a time over one of them (--shop, of a file "
-        "with pieces = 1); gaps "
+        f"{MatterKind.SEVERAL_SONOTRODES}: a shop with one block peens the target a length at a "
+        "time over it (--shop, of a file with pieces = 1). This floor is several side by side, "
+        "which must vibrate in phase and alike: settle with their maker how they are driven and "
+        "tuned for that; gaps "
         f"between them of {slit_in_words(1e3 * ball)}, half a ball"
     )
 

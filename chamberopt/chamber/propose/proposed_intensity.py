@@ -52,6 +52,8 @@ from chamberopt.design.materials import alloy
 
 MOST_PILOTS = 5
 INTENSITY = "process.intensity_mmA"  # whose reason stands in a design without a wish too
+# Factor into its range by which an intensity is aimed at, as a pilot of other balls tells another.
+INSIDE = 1.15
 MOST_TRIED = 3  # larger sizes that pilots compare
 FURTHER = 2.0  # times as large as the proposed balls, where no intensity says how far
 LARGER = f"{MatterKind.LARGER_BALLS}"
@@ -493,6 +495,7 @@ def _needed(made: Proposal, off: float) -> str:
         off: logarithm of the factor by which the intensity lies off.
     """
     now = setting_of(made)
+    off += math.copysign(math.log(INSIDE), off)
     amplitude = now.amplitude_um * math.exp(-off / AMPLITUDE_POWER)
     ball = now.ball_mm * math.exp(-off / BALL_POWER)
     too_large = ", larger than the target's fillets and slots allow by rule" if off < 0.0 else ""

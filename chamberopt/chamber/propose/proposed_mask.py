@@ -237,8 +237,11 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
     if hidden > LEAST and not part.target.reachable:
         found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
     posed = proposal.chamber.part
-    if (sharp := sharp_edges(posed.vertices, posed.triangles, posed.target)) > LEAST_EDGES:
-        long = f"{1e3 * sharp:.0f} mm of the target's"
+    sharp, place = sharp_edges(posed.vertices, posed.triangles, posed.target)
+    if sharp > LEAST_EDGES:
+        long = (
+            f"such as at {around(place[None])} in the chamber: {1e3 * sharp:.0f} mm of the target's"
+        )
         found.append(LeftOut({}, f"{MatterKind.SHARP_EDGES}, {long}{EDGES}"))
     met = posed.target | (touched(proposal.design, proposal.chamber) > 0.5)
     bare = bare_behind(posed.vertices, posed.triangles, posed.target, met, 1e-3 * THIN_MM)
@@ -386,8 +389,12 @@ def _in_words(one: Opening) -> str:
     return f"{size} mm at {format_point(np.round(one.place, 4))}"
 
 
-def sharp_edges(vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> float:
+def sharp_edges(
+    vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray
+) -> tuple[float, np.ndarray]:
     """Return the length [m] of the outer edges of a target that turn by more than SHARP.
+
+    The middle of the longest of them is returned too [m], (3,); that of the origin without any.
 
     Args:
         vertices, triangles: the part [m].
@@ -401,7 +408,9 @@ def sharp_edges(vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray)
     falls = vertices[triangles[two]].mean(axis=1) - start
     outer = np.einsum("ij,ij->i", falls, normals[one]) < 0.0
     rows = turned & outer & (target[one] | target[two])
-    return float(np.linalg.norm(end - start, axis=1)[rows].sum())
+    length = np.where(rows, np.linalg.norm(end - start, axis=1), 0.0)
+    longest = int(length.argmax())
+    return float(length.sum()), 0.5 * (start + end)[longest]
 
 
 def _bodies_of(

@@ -53,6 +53,11 @@ EXPECTED = (
     "saturation_time_s",
     "compression_depth_um",
 )
+# What a shop calls figures that only the program has names for.
+SHOP_NAMES = {
+    "exposure": "peening time over the time to 98 % coverage, mean",
+    "strength_um": "strength of the dents, to which mmA is proportional",
+}
 # Of the expected saturation time, after which strips are peened: a curve has at least four points,
 # one of them at twice that time or later (SAE J443).
 STRIP_TIMES = (0.25, 0.5, 1.0, 2.0)
@@ -74,7 +79,8 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
     shown = expected_figures(result)
     for row in shown:
         more = f"; range {row.range_with_unit}" if row.range_text else ""
-        yield row.label.text, f"{row.label.format(row.result)}{more}"
+        name = SHOP_NAMES.get(row.name, row.label.text)
+        yield name, f"{row.label.format(row.result)}{more}"
     if slow := time_at_slow_end(result):
         yield f"{metric_label(TIME).text}, at the slow end", slow
     wanted = result.design.process.intensity_mmA
