@@ -32,7 +32,7 @@ def comparison_end(comparison: Comparison, verbose: bool) -> list[Table | str]:
         verbose: all figures follow, by their names in files, with what would prove a difference.
     """
     told = summary(comparison)
-    content = [*told.answers, *told.doubts, "", told.table, ""]
+    content: list[Table | str] = [*told.answers, *told.doubts, "", told.table, ""]
     if verbose:
         return [*content, *comparison_lines(comparison)]
     return [*content, f"({told.legend} --verbose and compare.txt have every figure.)"]

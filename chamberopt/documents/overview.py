@@ -106,7 +106,7 @@ def comparison_overview(comparison: Comparison) -> Section:
     told = summary(comparison)
     answers = [Sentence(one, "sentence") for one in told.answers]
     doubts = [Sentence(one, "warning") for one in told.doubts]
-    content = [*answers, *doubts, told.table, Sentence(told.legend)]
+    content: list[Block] = [*answers, *doubts, told.table, Sentence(told.legend)]
     return Section(f"Comparison with {comparison.labels[0]}", content, is_answer=True)
 
 

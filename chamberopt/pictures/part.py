@@ -106,7 +106,7 @@ def _numbered(
 
     The places are in mm, each with the normal there, (k, 6).
     """
-    part, found = chamber.part, []
+    part, found = chamber.part, list[tuple[str, np.ndarray]]()
     middles = part.vertices[part.triangles].mean(axis=1)
     normals = unit_vectors(area_vectors(part.vertices, part.triangles))
     for one in known:

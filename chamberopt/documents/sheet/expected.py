@@ -79,8 +79,7 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
     shown = expected_figures(result)
     for row in shown:
         more = f"; range {row.range_with_unit}" if row.range_text else ""
-        name = SHOP_NAMES.get(row.name, row.label.text)
-        yield name, f"{row.label.format(row.result)}{more}"
+        yield shop_name(row), f"{row.label.format(row.result)}{more}"
     if slow := time_at_slow_end(result):
         yield f"{metric_label(TIME).text}, at the slow end", slow
     wanted = result.design.process.intensity_mmA
@@ -99,6 +98,11 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
             if rest:
                 yield "", f"{over.strip()}{rest}"
     yield "", f"± 95 % intervals. {limits_of_intervals(result, has_groups=True)}"
+
+
+def shop_name(row: Figure) -> str:
+    """Return what a shop calls a figure."""
+    return SHOP_NAMES.get(row.name, row.label.text)
 
 
 def expected_figures(result: Result) -> list[Figure]:

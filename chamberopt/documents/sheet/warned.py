@@ -13,7 +13,7 @@ from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
 from chamberopt.design.tolerances import USUAL, USUAL_IN_WORDS, tolerance_box
 from chamberopt.documents.answer import answer_lines, shot_lines
 from chamberopt.documents.report import open_matters, own_warnings
-from chamberopt.documents.sheet.expected import expected_figures
+from chamberopt.documents.sheet.expected import expected_figures, shop_name
 from chamberopt.documents.sheet.openings import FOLLOWS
 from chamberopt.documents.sheet.rows import (
     Row,
@@ -54,7 +54,7 @@ def alarms(result: Result) -> Iterator[str]:
     told = expected_figures(result)
     if result.design.calibration is None:  # without one they are rough, resolved or not
         told = [row for row in told if row.name not in OF_STRIPS]
-    unresolved = [row.label.text for row in told if is_unresolved(row.result)]
+    unresolved = [shop_name(row) for row in told if is_unresolved(row.result)]
     if unresolved:
         yield (
             f"Too few dents were simulated to resolve: {', '.join(unresolved)}. Simulate "
