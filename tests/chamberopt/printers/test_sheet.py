@@ -44,6 +44,7 @@ from chamberopt.documents.sheet import (
     title_block,
 )
 from chamberopt.documents.sheet.acceptance import acceptance_rows
+from chamberopt.documents.sheet.expected import SHOP_NAMES, shop_name
 from chamberopt.documents.wording import metric_label, per_cent, plain
 from chamberopt.peening.strip_holder import strip_room
 from chamberopt.peening.tolerance_result import ToleranceResult, ToleratedFigure
@@ -97,7 +98,7 @@ def test_its_figures_are_those_of_the_report(folder: Path) -> None:
     expected = rows["Peening, and what to expect"]
     for one in figures(load_result(folder), None):
         if one.name in ("mean_coverage", "time_to_98_s", "strength_um"):
-            assert expected[one.label.text] == one.label.format(one.result)
+            assert expected[shop_name(one)] == one.label.format(one.result)
     assert expected["peening time"] == "5 s to start with, NOT YET SET: see 3 peen"
     assert "uniform coverage" not in expected  # the aim of searches
     assert "Almen intensity in mmA is not known before strips are peened here" in expected[""]
@@ -487,7 +488,7 @@ def test_a_calibrated_mix_with_zones_and_tolerances(folder: Path) -> None:
     assert (zones.count("is not met"), zones.count("is met")) == (3, 3)
     assert zones.rindex("is not met") < zones.index("is met")  # the worst first
     assert rows["Peening, and what to expect"]["mean Almen intensity"] == "0.200 ± 0.010 mmA"
-    assert "strength of the dents, to which mmA is proportional" not in rows["Peening, and what to expect"]
+    assert SHOP_NAMES["strength_um"] not in rows["Peening, and what to expect"]
     checks = [expected for _, expected, _ in first_checks(result).rows]
     assert checks[0] == "50 (45.3 to 55.1) µm peak to valley where 50 is set"
     assert "0.200 ± 0.010 mmA" in checks
