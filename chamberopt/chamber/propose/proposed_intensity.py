@@ -476,7 +476,8 @@ def _told(
     off, more = wanted.off(predicted.value), ""
     if off:
         aim = f"{wanted.low:g}-{wanted.high:g}A"
-        more = f"; {MatterKind.NO_BALLS} {aim}: {_needed(made, off)}"
+        inside = off + math.copysign(math.log(INSIDE), off)
+        more = f"; {MatterKind.NO_BALLS} {aim}: {_needed(made, inside)}"
     reasons = dict(made.reasons)
     ball = "the nearest to the intensity" if off else "chosen for the intensity"
     reasons[f"sonotrode.{key}"] += f", {ball}"
@@ -495,7 +496,6 @@ def _needed(made: Proposal, off: float) -> str:
         off: logarithm of the factor by which the intensity lies off.
     """
     now = setting_of(made)
-    off += math.copysign(math.log(INSIDE), off)
     amplitude = now.amplitude_um * math.exp(-off / AMPLITUDE_POWER)
     ball = now.ball_mm * math.exp(-off / BALL_POWER)
     too_large = ", larger than the target's fillets and slots allow by rule" if off < 0.0 else ""

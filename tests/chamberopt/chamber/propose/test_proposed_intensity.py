@@ -516,7 +516,7 @@ def test_larger_balls_are_taken_that_give_the_intensity_and_are_no_slower(
     assert "touch 100% of the target, suit 100% and cover it about as soon" in reason
     why, (settle,) = clauses(reason)
     assert not why
-    assert settle.endswith("as the rest: then --ball-mm 1")
+    assert settle.text.endswith("as the rest: then --ball-mm 1")
     assert "about as soon by pilots as 4,000 of 1 mm" in reason
     slow = good._replace(found=pilot_of(0.12, 700.0))
     assert larger_instead(enough._replace(made=many), [slow], trials, asked) is None
