@@ -196,7 +196,7 @@ def test_a_size_that_may_jam_gives_way_to_one_that_serves_nearly_as_much(
     assert 1e3 * diameter == pytest.approx(chosen * scale)
     assert said.replace("0.5 mm", f"{0.5 * scale:g} mm") in reason
     assert "all sizes from 1.05 mm to 1.4 mm would jam" in reason
-    play = [one for one in clauses(reason)[1] if one.startswith("PLAY OF")]
+    play = [one.sentence for one in clauses(reason)[1] if one.sentence.startswith("PLAY OF")]
     assert len(play) == (chosen == 0.5)
 
 
@@ -207,7 +207,7 @@ def test_a_charge_that_is_cut_for_the_simulation_is_told_in_full(
     trimesh.creation.box((50, 40, 10)).export(tmp_path / "block.stl")
     made = propose(tmp_path / "block.stl", Wanted("mm", ball_mm=ball_mm), lambda _: [])
     assert sonotrode_area(made.chamber) > 1e-3
-    told = [one for one in to_settle(made, []) if one.startswith("CHARGE IS CUT")]
+    told = [one.sentence for one in to_settle(made, []) if one.sentence.startswith("CHARGE IS CUT")]
     assert len(told) == made.is_capped == is_cut
     if is_cut:
         full = charge_of(sonotrode_area(made.chamber), 1e-3 * ball_mm)

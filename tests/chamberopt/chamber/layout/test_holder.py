@@ -223,7 +223,7 @@ def test_a_hardness_that_a_name_does_not_tell_is_to_be_settled(
 ) -> None:
     trimesh.creation.box((30, 20, 10)).export(tmp_path / "block.stl")
     made = propose(tmp_path / "block.stl", Wanted("mm", alloy=metal), lambda _: [])
-    settle = clauses(made.reasons["materials.part"])[1]
+    settle = [one.sentence for one in clauses(made.reasons["materials.part"])[1]]
     assert [told in one for one in settle] == [True] * bool(told)
 
 
