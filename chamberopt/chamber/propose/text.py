@@ -104,8 +104,7 @@ def to_settle(proposal: Proposal, left_out: Sequence[LeftOut]) -> list[Matter]:
     said = _clauses_of(proposal)
     found = [one for key in sorted(said, key=place) for one in said[key][1]]
     found += map(
-        matter_of,
-        [*_resting_balls(proposal), *_many_balls(proposal), *_quicker_balls(proposal)],
+        matter_of, [*_resting_balls(proposal), *_many_balls(proposal), *_quicker_balls(proposal)]
     )
     for one in left_out:
         keys = " and ".join(f"part.target.{key}" for key in one.keys)
