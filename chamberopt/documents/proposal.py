@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.chamber.checks.fillets import OF_FILLET, OF_SLOT
 from chamberopt.chamber.checks.openings import find_openings, walls_end_at
-from chamberopt.chamber.layout.target import area_in_mm2
+from chamberopt.chamber.layout.target import BEVELS, area_in_mm2
 from chamberopt.chamber.matters import Matter, MatterKind
 from chamberopt.chamber.propose.proposed_intensity import INTENSITY
 from chamberopt.chamber.propose.text import clauses, to_settle
@@ -214,7 +214,7 @@ def _sentence(made: Proposal) -> str:
         one = f"in setting {made.strips.chosen + 1} of {count}"
         strips = f", {f'in each of {count} settings' if made.strips.are_alike else one}"
     target = _in_short(one_line(_target(made)))
-    if any(one.name == target and one.beside_mm for one in made.known):
+    if target == BEVELS:
         target = f"the welds ({target})"
     return (
         f"Peen {target} ({area}{strips}) of "

@@ -82,6 +82,7 @@ Keys = dict[str, Any]
 """Keys of [part.target], "surface" or "faces", and their values."""
 
 WHOLE: Keys = {"surface": ["all"]}
+BEVELS = "bevels"  # name of the surface of all bevels in hollow corners, which are fillet welds
 
 
 @dataclass(frozen=True)
@@ -367,9 +368,7 @@ def _bevels(mesh: PartMesh) -> list[Surface]:
     marked = np.isin(faces.of_triangle, own)
     leg_mm = 1e3 * leg_of_bevel(mesh.vertices, mesh.triangles, marked)
     beside_mm = max(0.5 * round(2.0 * leg_mm), 0.5)
-    return [
-        Surface("bevels", {"faces": keys}, marked, text, raises_stress=True, beside_mm=beside_mm)
-    ]
+    return [Surface(BEVELS, {"faces": keys}, marked, text, raises_stress=True, beside_mm=beside_mm)]
 
 
 def _single(mesh: PartMesh, of: Surface, number: int) -> Surface | None:

@@ -43,6 +43,16 @@ def test_all_that_is_to_be_settled_is_one_list(made: Proposal) -> None:
     assert max(map(len, text.splitlines())) <= WIDTH
 
 
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [("bevels", "the welds (bevels)"), ("fillets of 2 mm", "fillets of 2 mm"), ("PIN", "PIN")],
+)
+def test_only_bevels_are_called_welds(made: Proposal, name: str, told: str) -> None:
+    """Fillets have a strip beside them too, and are none."""
+    of_it = replace(made, reasons={**made.reasons, "part.target": f"{name}: as asked"})
+    assert proposal_in_words(of_it, []).sentence.startswith(f"Peen {told} (")
+
+
 def test_the_target_has_one_area_and_a_time_that_no_pilot_told_is_a_start(made: Proposal) -> None:
     """Rounds that are divided make it larger than in the file."""
     part = replace(made.chamber.part, area=1.01 * made.chamber.part.area)
