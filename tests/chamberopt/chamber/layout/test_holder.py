@@ -299,7 +299,7 @@ def test_what_is_seldom_peened_is_named_or_masked(tmp_path: Path, side: str) -> 
         assert "[mask]\nthickness_mm = 1  # a cap on BORE: not to be peened" in text
         return
     sharp, said = left_out
-    assert sharp.text.startswith("SHARP EDGES, 80 mm of the target's outer edges")
+    assert "mm in the chamber: 80 mm of the target's outer edges" in sharp.text
     assert made.design.mask is None
     assert said.text.startswith(
         "NOT MASKED: the shot also meets SIDES (1080 mm² of it), FLANGE (360 mm² of it);"
