@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -126,7 +127,7 @@ def _exact(point: Sequence[float]) -> str:
 FORMAT = 1
 MAX_DIFFERENCES = 12  # in one message
 OF_FURTHER = "begin_with", "optimizer.evaluations", "optimizer.seed"  # in which one differs
-RANGES = "study.design.ranges"  # no trial depends on them
+NO_MATTER = "study.design.ranges", "study.design.to_settle"  # no trial depends on them
 
 
 def study_inputs(study: Study, plan: Mapping[str, object] | None = None) -> dict[str, object]:
@@ -151,7 +152,8 @@ def require_same_inputs(
 ) -> None:
     """Raise InputError if the inputs with which the study began, `before`, differ from `now`.
 
-    The `[ranges]` of the design may differ: they are simulated after the last trial.
+    The `[ranges]` of the design may differ, as they are simulated after the last trial, and so may
+    what is to be settled.
     """
     title = f"{folder}: the study in this folder began otherwise:"
     remedy = "to resume it, restore these inputs; to run the new study, give another folder (--out)"
@@ -252,12 +254,13 @@ def _require_same(
 
 
 def _changed_names(before: Mapping[str, object], now: Mapping[str, object]) -> list[str]:
-    """Return the dotted names of values in which two tables differ, but for a study's ranges."""
+    """Return the dotted names of values in which two tables differ, but for what no trial of a
+    study depends on."""
     old, new = _flatten(before), _flatten(now)
     return [
         name
         for name in {**old, **new}
-        if not name.startswith(RANGES)
+        if not name.startswith(NO_MATTER)
         and (name not in old or name not in new or old[name] != new[name])
     ]
 
@@ -268,7 +271,8 @@ def _with_digests(value: object) -> Any:
         return {name: _with_digests(item) for name, item in value.items()}
     if isinstance(value, list):
         return [_with_digests(item) for item in value]
-    if isinstance(value, str) and Path(value).suffix and Path(value).is_file():
+    # Paths in a design are whole ones. Of a long sentence, Path.is_file raises an OSError.
+    if isinstance(value, str) and os.path.isabs(value) and os.path.isfile(value):
         with open_plain(Path(value), follow=True) as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
         return {"file": Path(value).name, "sha256": digest}

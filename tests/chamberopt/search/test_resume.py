@@ -367,6 +367,19 @@ class TestChanges:
         heavier = study().model_copy(update={"design": GEAR.changed({"shot.mass_g": 6.0})})
         assert "study.design.shot.mass_g: was 5.0, is 6.0" in self.refused(heavier, folder)
 
+    def test_of_what_is_to_be_settled_is_none(self, folder: Path) -> None:
+        """A sentence with a point in it, longer than a file's name may be, is no path of a file."""
+        told = "LARGER THAN ONE SONOTRODE: a gap of 0.75 mm. " + "Settle it with its maker. " * 12
+        matters = GEAR.model_copy(update={"to_settle": (told,)})
+        done = calls(folder)
+        run(study().model_copy(update={"design": matters}), folder)
+        assert calls(folder) > done
+        begun = folder.with_name("with a matter")
+        run(study().model_copy(update={"design": matters}), begun)
+        done = calls(begun)
+        run(study(), begun)  # once it is settled
+        assert calls(begun) == done
+
     def test_of_ranges_alone_is_none(self, folder: Path) -> None:
         done = calls(folder)
         known = study().model_copy(update={"design": GEAR.changed({"ranges": {"v0": [1, 1]}})})
