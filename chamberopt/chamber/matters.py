@@ -69,7 +69,6 @@ class MatterKind(StrEnum):
     # The balls, the intensity and the time.
     IRON = "STEEL LEAVES IRON"
     JAM = "BALLS JAM"
-    RESTING_BALLS = "BALLS CAN COME TO REST"
     PLAY = "PLAY OF"
     MAY_JAM = "BALLS MAY JAM IN A GAP"
     NO_SIZE = "NO SIZE SUITS ALL"

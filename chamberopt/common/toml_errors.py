@@ -58,6 +58,11 @@ def closest_name(name: str, known: Iterable[str]) -> str | None:
     return by_lower[close[0]] if close else None
 
 
+def _letters(name: str) -> str:
+    """Return letters and digits alone of a name, so that "ti6" begins "Ti-6Al-4V"."""
+    return re.sub(r"[^a-z0-9.]", "", name.lower())
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return a hint for a wrong name: "did you mean 'x'?" or, without a similar name, all names.
 
@@ -69,7 +74,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     """
     words, table = list(known), name.rpartition(".")[0]
     words = [one for one in words if table and one.rpartition(".")[0] == table] or words
-    longer = [one for one in words if one.lower().startswith(name.lower())]
+    longer = [one for one in words if _letters(one).startswith(_letters(name))]
     if 1 < len(longer) <= MAX_CHOICES and len(name) >= BEGINNING:
         return f"did you mean {' or '.join(map(repr, longer))}?"
     close = closest_name(name, words)

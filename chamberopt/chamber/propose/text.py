@@ -9,8 +9,6 @@ from typing import Any, NamedTuple
 
 import tomlkit
 
-from chamberopt.chamber.checks.place_names import PART
-from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.layout.balls import MANY, MISSED
 from chamberopt.chamber.layout.target import Surface
 from chamberopt.chamber.matters import Matter, MatterKind, matter_of
@@ -103,25 +101,13 @@ def to_settle(proposal: Proposal, left_out: Sequence[LeftOut]) -> list[Matter]:
 
     said = _clauses_of(proposal)
     found = [one for key in sorted(said, key=place) for one in said[key][1]]
-    found += map(
-        matter_of, [*_resting_balls(proposal), *_many_balls(proposal), *_quicker_balls(proposal)]
-    )
+    found += map(matter_of, [*_many_balls(proposal), *_quicker_balls(proposal)])
     for one in left_out:
         keys = " and ".join(f"part.target.{key}" for key in one.keys)
         many = "" if len(one.keys) > 1 else "s"
         leave = f": {keys} in the design leave{many} it out" if keys else ""
         found.append(matter_of(f"{one_line(one.text)}{leave}"))
     return sorted(dict.fromkeys(found), key=lambda one: one.urgency)
-
-
-def _resting_balls(proposal: Proposal) -> Iterator[str]:
-    """Yield that balls would come to rest on the part, and the remedies, as its check tells them.
-
-    They would be lost to the charge, and shield what they lie on.
-    """
-    for one in proposal.warnings:
-        if one.kind is WarningKind.REST and PART in one.about:
-            yield one.message.replace("balls can come to rest", MatterKind.RESTING_BALLS, 1)
 
 
 def _many_balls(proposal: Proposal) -> Iterator[str]:

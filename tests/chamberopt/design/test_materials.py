@@ -277,5 +277,7 @@ class TestFriction:
 
 
 def test_a_name_without_its_temper_is_answered_with_those_that_have_one() -> None:
+    with pytest.raises(InputError, match=r"did you mean 'Ti-6Al-4V' or .*'Ti-6242'"):
+        alloy("ti6")
     with pytest.raises(InputError, match=r"did you mean '7075-T6' or .*'7075-T7351'"):
         alloy("7075")

@@ -229,7 +229,6 @@ def test_what_faces_away_is_offered_for_leaving_out(
         known=known,
         design=SimpleNamespace(part=part, steps=None, in_steps=few_balls),
         chamber=SimpleNamespace(part=posed, steps=()),
-        warnings=(),
         tables={"part": {"mesh": str(tmp_path / "gear.obj")}, "part.target": target.keys},
         reasons={},
         trials=(),
