@@ -36,7 +36,7 @@ class Section {
     if (!this.on) return;
     this.on = false;
     for (const [name, mesh] of this.view.all()) {
-      if (this.#cuts(name)) this.#clip(mesh.material, null);
+      if (this.#cuts(name)) this.#clipAll(mesh, null);
       for (const one of [...mesh.children]) if (one.userData.stencil) this.#drop(one);
     }
     for (const fill of this.#fills.values()) this.#drop(fill);
@@ -56,7 +56,7 @@ class Section {
   take(name, mesh) {
     if (!this.on || !this.#cuts(name)) return;
     this.#stale = true;
-    this.#clip(mesh.material, [this.plane]);
+    this.#clipAll(mesh, [this.plane]);
     const [body, , how] = Section.SURFACES[name] ?? [];
     if (!body || mesh.userData.open || name === "sonotrode" && this.view.get("block")) return; // the block is the body below it
     const shape = how === "shell" ? Section.shell(mesh.geometry, Section.THICKNESS * this.view.home.size)
@@ -115,6 +115,10 @@ class Section {
   #kindOf(body) { return Object.values(Section.SURFACES).find(([one]) => one === body)[1]; }
   #order(body = "part") { return 10 + 2 * Section.BODIES.indexOf(body); }
   #clip(material, planes) { Object.assign(material, { clippingPlanes: planes, needsUpdate: true }); }
+  #clipAll(mesh, planes) { // with its sharp edges
+    for (const one of [mesh, ...mesh.children.filter((child) => child.userData.isEdge)]) this.#clip(one.material, planes);
+  }
+
   #drop(mesh) {
     mesh.removeFromParent();
     mesh.geometry.dispose();

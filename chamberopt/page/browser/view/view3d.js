@@ -5,6 +5,7 @@ const TEXT_HEIGHT = 0.0115; // over its distance: 2.2 % of the view's height
 const TEXT_PX = 15; // least height on the screen, so that a text is read in a small view too
 const OPACITY = { wall: 0.16, sonotrode: 0.9, block: 1 }; // of what is seen through, by kind; of a surface by its name
 const MARKED = 0.5; // opacity of what marks triangles, so that their own colour is seen
+const EDGED = ["part", "remeshed"], MOST_EDGED = 200000; // whose sharp edges are drawn, and up to how many triangles
 const FROM_BELOW = 0.08; // opacity of the sonotrode before the part
 const WIDE = 0.7; // width over height of a view that shows all, also what is as wide as its diagonal
 const LENS = 30, PARALLEL = 0.1; // degrees of the view from bottom to top; of an eye so far away that lines of sight are parallel
@@ -116,7 +117,17 @@ class View3D {
     const mesh = new THREE.Mesh(geometry, material);
     Object.assign(mesh.userData, { kinds: kind ? [kind] : [], open, points, index: triangles });
     if (name === "sonotrode") this.#rim(points, triangles, colour);
+    if (EDGED.includes(name) && !scale && triangles.length < 3 * MOST_EDGED) this.#edge(mesh);
     return this.#keep(name, this.#along(kind, mesh));
+  }
+
+  // Draw the sharp edges of a surface, as a drawing does. It is pushed back a little, so that they are seen on it.
+  #edge(mesh) {
+    const geometry = new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(Measure.sharp(mesh), 3));
+    const lines = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: "#1c2226", transparent: true, opacity: 0.5 }));
+    lines.userData.isEdge = true;
+    Object.assign(mesh.material, { polygonOffset: true, polygonOffsetFactor: 0.5, polygonOffsetUnits: 0.5 });
+    mesh.add(lines);
   }
 
   // The border of the sonotrode in its colour, which hardly shows where the part is seen through it.
