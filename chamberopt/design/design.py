@@ -64,6 +64,11 @@ class Design(FileTable, ShownInNotebook):
         "what is to be settled before the chamber is built; warned of until it is taken out",
         (),
     )
+    settled: Annotated[Several[str], Field(max_length=MAX_TO_SETTLE)] = list_field(
+        f"a list of at most {MAX_TO_SETTLE} texts",
+        "what was to be settled and is, with the day and perhaps how: for the record on the sheet",
+        (),
+    )
     part: PartTable
     chamber: ChamberTable
     sonotrode: Sonotrode

@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from chamberopt.results.records import AdviceRecord, StudyRecord
     from chamberopt.search.trial_log import Trial
 
+SETTLED = "Settled"  # title of the list of matters that are
 SUBTITLES = {
     "study": "Report of a study: the best chamber found",
     "simulation": "Report of one simulated chamber",
@@ -320,10 +321,12 @@ def own_warnings(result: Result) -> list[str]:
 
 
 def _matters(result: Result) -> Iterator[Section]:
-    """Yield a section with the matters of each urgency of which there are some."""
+    """Yield a section with the matters of each urgency, if any, and one with what is settled."""
     for urgency, found in groupby(open_matters(result), lambda one: one.urgency):
         texts = [keys_in_words(f"{one.mark.capitalize()}{one.text}") for one in found]
         yield Section(urgency.in_words, [Items(texts)])
+    if settled := result.design.settled:
+        yield Section(SETTLED, [Items([keys_in_words(one) for one in settled])])
 
 
 def notes_section(result: Result) -> Section:

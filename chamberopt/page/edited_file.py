@@ -9,6 +9,7 @@ import time
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,7 @@ FACETS, ACCURACY = "chamber.facets", "process.accuracy"  # a number, and where i
 PROPOSED = "proposed by `chamberopt new`"
 CHANGED = "changed by you; proposed was "  # and the value, before the reason behind that
 INTENSITY_LINE = re.compile(r"^# Almen intensity: (.+)$|^intensity_mmA = .*?# (.+)$", re.MULTILINE)
-TO_SETTLE = "to_settle"  # from which the page takes out what is settled
+TO_SETTLE, SETTLED = "to_settle", "settled"  # the page moves what is settled to the second list
 # Tables that what is to be settled of a proposal is told of; a matter says which were changed.
 OF_MATTERS = "part", "chamber", "sonotrode", "shot", "holder", "mask", "materials"
 SINCE, ADVICE = "CHANGED SINCE IT WAS PROPOSED: ", "; settle what else is listed if it still holds"
@@ -273,6 +274,7 @@ class EditedFile:
         elif name == TO_SETTLE:
             for k in reversed(range(len(table[last]))):
                 if table[last][k] not in value:
+                    _record_settled(table, str(table[last][k]))
                     del table[last][k]
         elif not isinstance(table, list):
             table[last] = _inline(value)
@@ -330,6 +332,17 @@ def _keep_matters_true(document: Any, changes: Changes) -> None:
         del matters[matters.index(found[0])]
     if names and len(matters):
         matters.insert(0, f"{SINCE}{', '.join(dict.fromkeys(names))}{ADVICE}")
+
+
+def _record_settled(document: Any, text: str) -> None:
+    """Note in a parsed design that a matter is settled, and on which day."""
+    import tomlkit
+
+    if text.startswith(SINCE):  # it told of the other matters
+        return
+    if SETTLED not in document:
+        document[SETTLED] = tomlkit.array().multiline(True)
+    document[SETTLED].append(f"{text} (marked as settled on {date.today():%Y-%m-%d})")
 
 
 def alloy_suggestions() -> list[tuple[str, str]]:

@@ -127,7 +127,8 @@ def _exact(point: Sequence[float]) -> str:
 FORMAT = 1
 MAX_DIFFERENCES = 12  # in one message
 OF_FURTHER = "begin_with", "optimizer.evaluations", "optimizer.seed"  # in which one differs
-NO_MATTER = "study.design.ranges", "study.design.to_settle"  # no trial depends on them
+OF_NO_TRIAL = "ranges", "to_settle", "settled"  # of the design: no trial depends on them
+NO_MATTER = tuple(f"study.design.{one}" for one in OF_NO_TRIAL)
 
 
 def study_inputs(study: Study, plan: Mapping[str, object] | None = None) -> dict[str, object]:
@@ -195,7 +196,7 @@ class StudyInputs:
         did not know when the study began.
         """
         before, now = self.study["design"], _with_digests(design.model_dump(mode="json"))
-        left_out = ("ranges", "process.accuracy", "to_settle", *self.vary)
+        left_out = ("process.accuracy", *OF_NO_TRIAL, *self.vary)
         return [
             name
             for name in sorted(_flatten(before).keys() & set(_changed_names(before, now)))

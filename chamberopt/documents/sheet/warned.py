@@ -12,7 +12,7 @@ from chamberopt.common.key_words import key_in_words, title_with_unit
 from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
 from chamberopt.design.tolerances import USUAL, USUAL_IN_WORDS, tolerance_box
 from chamberopt.documents.answer import answer_lines, shot_lines
-from chamberopt.documents.report import open_matters, own_warnings
+from chamberopt.documents.report import SETTLED, open_matters, own_warnings
 from chamberopt.documents.sheet.expected import expected_figures, shop_name
 from chamberopt.documents.sheet.openings import FOLLOWS
 from chamberopt.documents.sheet.rows import (
@@ -153,10 +153,12 @@ def tolerance_rows(result: Result, openings: Sequence[Opening] = ()) -> Iterator
 
 
 def matter_tables(result: Result) -> Iterator[tuple[str, Iterator[Row]]]:
-    """Yield title and rows of a table with the matters of each urgency."""
+    """Yield title and rows of a table with the matters of each urgency, and what is settled."""
     for urgency, found in groupby(open_matters(result), lambda one: one.urgency):
         texts = [for_the_shop(keys_in_words(one.sentence)) for one in found]
         yield urgency.in_words, (("", text) for text in texts)
+    if settled := result.design.settled:
+        yield SETTLED, (("", for_the_shop(keys_in_words(one))) for one in settled)
 
 
 def warning_rows(result: Result) -> Iterator[Row]:

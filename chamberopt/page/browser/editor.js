@@ -123,7 +123,7 @@ function fillSettle() {
   const open = state.changes.to_settle ?? state.file.to_settle.map((one) => one.text);
   const left = state.file.to_settle.filter((one) => open.includes(one.text)), fold = find("settle");
   const lists = byUrgency(left, (one) => {
-    const done = element("button", { type: "button", textContent: "Mark as settled", title: "take it out of the design" });
+    const done = element("button", { type: "button", textContent: "Mark as settled", title: "the design keeps it as settled, with the day, and the sheet tells it" });
     done.addEventListener("click", () => change({ to_settle: open.filter((text) => text !== one.text) }));
     const takes = one.takes.map(({ label, changes }) => {
       const [[name, wanted]] = Object.entries(changes), take = element("button", { type: "button", textContent: label, title: `sets ${name}`, disabled: value(name) === wanted });

@@ -138,7 +138,7 @@ TIME = "time_to_98_s"
 REPLICAS = "process.accuracy.replicas"
 STOPPING_RULES = ("process.accuracy.objective_half_width", "process.accuracy.max_replicas")
 # Values of a design that make no other chamber or process.
-NOT_COMPARED: dict[str, Any] = {"part": {"mesh", "unit"}, "to_settle": True}
+NOT_COMPARED: dict[str, Any] = {"part": {"mesh", "unit"}, "to_settle": True, "settled": True}
 
 
 @dataclass(frozen=True)

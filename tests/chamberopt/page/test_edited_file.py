@@ -2,6 +2,7 @@
 
 import difflib
 import tomllib
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,11 @@ def test_what_is_to_be_settled_says_which_values_it_was_told_of(file: EditedFile
         assert said.startswith(f"CHANGED SINCE IT WAS PROPOSED: {words}; settle what")
         assert other == "LONG"
     EditedFile(file.path, False).save({"shot.mass_g": 2, "to_settle": [said]})
-    assert EditedFile(file.path, False).design.to_settle == ()
+    design = EditedFile(file.path, False).design
+    assert design.to_settle == ()
+    today = f"{date.today():%Y-%m-%d}"
+    kept = [f"{one} (marked as settled on {today})" for one in ("NOT MASKED: ask", "LONG")]
+    assert list(design.settled) == kept
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ from chamberopt.design.intensity import WantedIntensity
 from chamberopt.documents.answer import answer_lines
 from chamberopt.documents.coverage import figures
 from chamberopt.documents.document import Document, Section, Sentence, Table
-from chamberopt.documents.report import open_matters, own_warnings
+from chamberopt.documents.report import SETTLED, open_matters, own_warnings
 from chamberopt.documents.sheet import (
     REQUALIFY,
     AsBuilt,
@@ -435,6 +435,10 @@ def test_what_the_simulation_has_settled_is_told_no_more(
     tables = {one.caption: one for one in limit_tables(told)}
     assert tables[Urgency.BEFORE_BUILDING.in_words].rows == [("", "NOT MASKED: ask.")]
     assert (Urgency.ASSUMED.in_words in tables) is bool(assumed)
+    assert SETTLED not in tables
+    kept = replace(told, design=design.changed({"to_settle": [], "settled": ["LONG (by phone)"]}))
+    (table,) = (one for one in limit_tables(kept) if one.caption == SETTLED)
+    assert table.rows == [("", "LONG (by phone)")]
 
 
 def test_the_openings_of_a_later_step_are_told(folder: Path) -> None:
