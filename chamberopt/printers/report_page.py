@@ -30,8 +30,8 @@ POLICY = (
 VIEW = "view/view3d.js", "view/section.js", "view/round.js", "view/measure.js", "view/tools.js"
 SCRIPTS = "three/three.min.js", *VIEW, "part.js"
 WHY_TIME = (
-    "Nearly all of the target is covered to 95 % or more, so the picture begins with another "
-    "quantity."
+    "A map of coverage would be of one colour, 95 % and more, wherever dents suffice to tell it, "
+    "so the picture begins with another quantity."
 )
 HELP = (
     "Drag to turn, use the wheel to zoom after a click or with Ctrl, point at the target to see "

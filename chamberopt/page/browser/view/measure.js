@@ -37,8 +37,9 @@ class Measure {
     const hit = Measure.place(view, event);
     if (!hit) { this.tell("nothing is there: click a surface"); return; }
     const first = this.#first?.view === view ? this.#first : null;
-    this.#first = first ? null : { view, ...hit };
     const met = Measure.#met(view, event), round = met?.name ? Round.of(view.get(met.name), met.triangle, met.place) : null;
+    if (round && !round.isFlat) hit.normal = null; // a facet's: the surface turns there
+    this.#first = first ? null : { view, ...hit };
     const across = round ? [Measure.across(round)] : [], lines = first ? [...Measure.words(first, hit), ...across] : across;
     this.#show(view, first ? [first.place, hit.place] : [hit.place], lines, round);
     this.tell(first ? lines.join("; ") : [...across, `from ${hit.on} at ${Measure.at(hit.place)}: click the other point`].join("; "));

@@ -14,7 +14,7 @@ class Round {
   static MOST = 400; // steps of the line in which a plane cuts a surface, to each side
 
   // Circle round the axis of the round surface at a triangle of a mesh, circle along which a torus or ball bends most
-  // there, or round border of the flat face there that is nearest to a place: { diameter, isArc: whether less than half of it is there, isRough: whether it is known
+  // there, or round border of the flat face there that is nearest to a place: { diameter, isFlat: whether it is such a border, isArc: whether less than half of it is there, isRough: whether it is known
   // to two digits only, at(angle): a place on it }; null for neither.
   static of(mesh, triangle, place) {
     const { normals, beside } = Round.facets(mesh), own = place.clone().applyMatrix4(mesh.matrixWorld.clone().invert());
@@ -23,9 +23,9 @@ class Round {
     const next = [...new Set(flat.flatMap((k) => [0, 1, 2].map((c) => beside[3 * k + c])))]
       .filter((k) => k >= 0 && !inside.has(k) && normals[k].dot(normals[triangle]) > Round.SMOOTH);
     const round = next.slice(0, Round.TRIED).map((k) => Round.#surface(mesh, [...flat, ...facet(k)], normals[triangle].clone().cross(normals[k]), own));
-    const found = round.reduce((best, one) => one && one.count > (best?.count ?? 0) ? one : best, null)
-      ?? Round.#tube(mesh, triangle, normals[triangle], own) ?? Round.#border(mesh, flat, normals[triangle], own);
-    return found && { diameter: 2 * found.radius, isArc: Boolean(found.isArc), isRough: Boolean(found.isRough), at: (angle) => found.at(angle).applyMatrix4(mesh.matrixWorld) };
+    const bent = round.reduce((best, one) => one && one.count > (best?.count ?? 0) ? one : best, null) ?? Round.#tube(mesh, triangle, normals[triangle], own);
+    const found = bent ?? Round.#border(mesh, flat, normals[triangle], own);
+    return found && { diameter: 2 * found.radius, isFlat: !bent, isArc: Boolean(found.isArc), isRough: Boolean(found.isRough), at: (angle) => found.at(angle).applyMatrix4(mesh.matrixWorld) };
   }
 
   // Normal of each triangle of a mesh, and the triangle beside each of its sides, -1 at the border; found once.
