@@ -46,7 +46,7 @@ from chamberopt.peening.posterior import (
 from chamberopt.peening.probes import ArcProbe, Impacts, PartProbe, SaturationProbe, whole_target
 from chamberopt.peening.setups import DropModel, Setup, amplitude_model, rows_of, simulate_setup
 from chamberopt.peening.strip import strip_cells
-from chamberopt.peening.strip_holder import strip_design
+from chamberopt.peening.strip_holder import lies_along_y, strip_design
 
 if TYPE_CHECKING:
     from chamberopt.common.progress import Progress
@@ -180,7 +180,8 @@ def _arcs(strip: MeasuredStrip, setup: Setup) -> Data:
     """
     times = np.array(strip.time_s)
     drawn = np.geomspace(0.5 * times[0], 1.5 * times[-1], DRAWN_TIMES)
-    model = setup.model(ArcProbe(strip_cells(strip.size), (*strip.time_s, *drawn.tolist())))
+    cells = strip_cells(strip.size, lies_along_y(setup.design, strip.size))
+    model = setup.model(ArcProbe(cells, (*strip.time_s, *drawn.tolist())))
     label = f"{2e6 * setup.design.sonotrode.amplitude:g} µm peak to valley"
     sd = np.full(len(times), 1e-2 * strip.sd_percent)
     y = np.log(np.array(strip.arc_mm))

@@ -147,8 +147,12 @@ class StripCurve(NamedTuple):
         return np.asarray(self.at(2.0 * times) - SATURATED * self.at(times))
 
 
-def strip_cells(size: StripSize) -> Cells:
-    """Divide a strip, whose middle is at x = y = 0, into cells in which dents are counted."""
+def strip_cells(size: StripSize, along_y: bool = False) -> Cells:
+    """Divide a strip, whose middle is at x = y = 0, into cells in which dents are counted.
+
+    Args:
+        along_y: its length is along y instead of x.
+    """
     if size.is_disc:
         return _disc_cells(0.5 * size.length)
     a, b = GAUGE
@@ -165,7 +169,7 @@ def strip_cells(size: StripSize) -> Cells:
     def of(hits: Hits) -> np.ndarray:
         i, j = (
             np.searchsorted(edges, hits.place[:, axis], "right") - 1
-            for axis, edges in enumerate((along, across))
+            for axis, edges in ((int(along_y), along), (int(not along_y), across))
         )
         inside = (i >= 0) & (i < CELLS[0]) & (j >= 0) & (j < CELLS[1])
         return np.where(inside, i * CELLS[1] + j, -1)

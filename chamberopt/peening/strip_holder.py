@@ -7,12 +7,14 @@
     |_____________________________|
                sonotrode
 
-The strip is flush with its holder, and both are of the same steel.
+The strip is flush with its holder, and both are of the same steel. It lies along x, or along y where
+it fits only so.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -53,11 +55,11 @@ def strip_design(
         InputError: the chamber has a shape without a lid, or the strip does not fit into it.
     """
     chamber, distance, outline = _lid_of(design, distance_mm)
-    _require_room(size, outline)
+    edge = _edge_that_fits(size, outline)
     thickness = chamber.height_mm - distance + MARGIN_MM
     half_sides = np.abs(outline).max(axis=0) + abs(chamber.slope) * thickness + MARGIN_MM
     path = folder / HOLDER_FILE
-    write_text(path, _holder_obj(_edge_mm(size), half_sides, thickness))
+    write_text(path, _holder_obj(edge, half_sides, thickness))
     data = design.model_dump()
     data["part"] = {"mesh": str(path), "unit": "mm", "target": {"surface": [STRIP_GROUP]}}
     data["chamber"]["sonotrode_distance_mm"] = float(distance)
@@ -83,10 +85,20 @@ def target_level_mm(chamber: Chamber) -> int:
 def why_no_strip(design: Design, size: StripSize) -> str:
     """Return in words why no strip is flush in the lid in the place of the part; "" if it fits."""
     try:
-        _require_room(size, _lid_of(design, None)[2])
+        _edge_that_fits(size, _lid_of(design, None)[2])
     except InputError as error:
         return str(error)
     return ""
+
+
+def lies_along_y(design: Design, size: StripSize, distance_mm: float | None = None) -> bool:
+    """Return whether a strip that fits into a lid lies along y in it, as it does not fit along x.
+
+    Args:
+        distance_mm: distance from the sonotrode to the strip; None: as far as the part.
+    """
+    outline = _lid_of(design, distance_mm)[2]
+    return _growth(_edge_mm(size), outline) < 1.0 - FIT_MM
 
 
 def _lid_of(
@@ -147,10 +159,9 @@ def strip_room(design: Design) -> StripRoom | None:
 
 def _largest(size: StripSize, outline: np.ndarray) -> StripRoom:
     """Return the largest strip of a size's proportions, and disc, inside an outline (n, 2) [mm]."""
-    rectangle = 500.0 * np.array([[size.length, size.width], [size.length, -size.width]])
-    length = 0.1 * math.floor(
-        10.0 * _growth(np.r_[rectangle, -rectangle], outline) * 1e3 * size.length
-    )
+    rectangle = _edge_mm(replace(size, is_disc=False))
+    growth = max(_growth(edge, outline) for edge in (rectangle, _turned(rectangle)))
+    length = 0.1 * math.floor(10.0 * growth * 1e3 * size.length)
     width = math.floor(10.0 * length * size.width / size.length) / 10
     disc = 0.1 * math.floor(10.0 * 2.0 * float(_sides(outline)[1].min()))
     return StripRoom(length, width, disc)
@@ -169,10 +180,15 @@ def _growth(edge: np.ndarray, outline: np.ndarray) -> float:
     return float((reach / (edge @ normal.T).max(axis=0)).min())
 
 
-def _require_room(size: StripSize, outline: np.ndarray) -> None:
-    """Raise InputError, with the sizes that fit, unless the strip is inside the outline [mm]."""
-    if _growth(_edge_mm(size), outline) >= 1.0 - FIT_MM:
-        return
+def _edge_that_fits(size: StripSize, outline: np.ndarray) -> np.ndarray:
+    """Return the corners (n, 2) of a strip along x, or else along y, inside an outline [mm].
+
+    Raises InputError, with the sizes that fit, if it is inside neither way.
+    """
+    edge = _edge_mm(size)
+    for one in (edge, _turned(edge)):
+        if _growth(one, outline) >= 1.0 - FIT_MM:
+            return one
     room = _largest(size, outline)
     given = f"a {size}" if size.is_disc else f"a strip of {size}"
     offers = f"--disc-mm {room.disc:g}"
@@ -184,8 +200,13 @@ def _require_room(size: StripSize, outline: np.ndarray) -> None:
     )
 
 
+def _turned(edge: np.ndarray) -> np.ndarray:
+    """Return the corners (n, 2) of a strip turned by 90 degrees."""
+    return np.c_[-edge[:, 1], edge[:, 0]]
+
+
 def _edge_mm(size: StripSize) -> np.ndarray:
-    """Return the corners of a strip [mm], (n, 2), counter-clockwise."""
+    """Return the corners of a strip along x [mm], (n, 2), counter-clockwise."""
     if size.is_disc:
         angle = 2.0 * np.pi * (np.arange(SIDES) + 0.5) / SIDES
         return np.asarray(500.0 * size.length * np.c_[np.cos(angle), np.sin(angle)])

@@ -44,7 +44,7 @@ from chamberopt.peening.strip import (
     strip_curve,
     surface_cells,
 )
-from chamberopt.peening.strip_holder import HOLDER_FILE, strip_design
+from chamberopt.peening.strip_holder import HOLDER_FILE, lies_along_y, strip_design
 from chamberopt.simulation.effort import Effort
 from chamberopt.simulation.replicas import Replica, ReplicaSetting, simulate_replicas
 from chamberopt.simulation.resting_balls import resting_notes
@@ -145,9 +145,11 @@ def strip_in_lid(
     """
     changed = strip_design(design, size, folder, distance_mm)
     distance = changed.chamber.sonotrode_distance_mm
-    place = f"{size}, flush in a lid {distance:g} mm over the sonotrode"
+    along_y = lies_along_y(changed, size)
+    along = ", along y" if along_y else ""
+    place = f"{size}{along}, flush in a lid {distance:g} mm over the sonotrode"
     notes = (GAUGED if size.is_whole else EVEN,)
-    return StripSetting(changed, strip_type, place, strip_cells(size), notes)
+    return StripSetting(changed, strip_type, place, strip_cells(size, along_y), notes)
 
 
 def strip_in_zone(

@@ -33,7 +33,13 @@ from chamberopt.peening.strip import (
     strip_curve,
     surface_cells,
 )
-from chamberopt.peening.strip_holder import HOLDER_FILE, strip_design
+from chamberopt.peening.strip_holder import (
+    HOLDER_FILE,
+    lies_along_y,
+    strip_design,
+    strip_room,
+    why_no_strip,
+)
 from tests.helpers.synthetic import DESIGNS, plane_chamber, plate_design
 
 DESIGN = plate_design()
@@ -206,6 +212,7 @@ def test_a_shop_s_points_saturate_where_they_were_published_to() -> None:
         ({"shape": "cylinder", "diameter_mm": 80.0}, "whole"),
         ({"shape": "cylinder", "diameter_mm": 26.0, "inclination_deg": 3.0}, "disc"),
         ({"shape": "box", "length_mm": 77.0, "width_mm": 20.0}, "whole"),
+        ({"shape": "box", "length_mm": 39.5, "width_mm": 80.0}, "whole"),  # along y
         ({"shape": "prism", "sides": 6, "across_mm": 30.0, "corner_radius_mm": 4.0}, "disc"),
     ],
 )
@@ -228,6 +235,28 @@ def test_the_strip_closes_the_chamber(chamber: dict, size: str, tmp_path: Path) 
         assert exposed == pytest.approx(32 * (12.5e-3) ** 2 * np.sin(sector), rel=1e-5)
     else:
         assert exposed == pytest.approx(LENGTH * WIDTH, rel=1e-5)
+
+
+def test_a_strip_along_the_longer_side_weighs_the_same_places(tmp_path: Path) -> None:
+    """Cells along y are those along x turned by 90 degrees."""
+    for room, turned in (((80.0, 39.5), False), ((39.5, 80.0), True), ((50.0, 50.0), None)):
+        box = {"shape": "box", "length_mm": room[0], "width_mm": room[1], "height_mm": 40.0}
+        data = DESIGN.model_dump() | {"chamber": {**box, "sonotrode_distance_mm": 25.0}}
+        design = validate(Design, data)
+        assert bool(why_no_strip(design, StripSize())) == (turned is None)
+        if turned is not None:
+            assert lies_along_y(design, StripSize()) == turned
+    places = np.random.default_rng(1).uniform(-0.5, 0.5, (200, 2)) * (LENGTH, WIDTH)
+    along_x, along_y = (strip_cells(StripSize(), one) for one in (False, True))
+    found = along_x.of(hits_at(places))
+    assert np.array_equal(found, along_y.of(hits_at(places[:, ::-1])))
+    assert (found >= 0).any()
+    room = strip_room(validate(Design, DESIGN.model_dump() | {"chamber": {
+        "shape": "box", "length_mm": 19.5, "width_mm": 60.0, "height_mm": 40.0,
+        "sonotrode_distance_mm": 25.0,
+    }}))  # fmt: skip
+    assert room is not None
+    assert room.length == pytest.approx(60.0, abs=0.11)
 
 
 def test_what_does_not_fit_is_refused_and_what_does_is_named(tmp_path: Path) -> None:
