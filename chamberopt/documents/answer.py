@@ -58,11 +58,11 @@ def answer(result: Result, start: Result | None, tells_aim: bool = True) -> str:
                 f"{only}Too few dents were simulated to tell how much of the target is covered "
                 f"after {plain(treatment_time)} s."
             )
-        if is_bound(known := result.metrics["mean_coverage"]):
+        if is_bound(result.metrics["mean_coverage"]):
+            # The bound of the mean follows from those 95 %, and is below their coverage.
             return (
-                f"After {plain(treatment_time)} s {_least_covered(result)}; the mean is "
-                f"{known.in_words}, and more dents would tell it closer (95 % intervals); "
-                f"{full_coverage(result)}."
+                f"After {plain(treatment_time)} s {_least_covered(result)}, and more dents would "
+                f"tell the mean (95 % intervals); {full_coverage(result)}."
             )
         text = (
             f"After {plain(treatment_time)} s the target is covered to "
@@ -124,8 +124,10 @@ def on_average(result: Result) -> str:
 
 
 def _least_covered(result: Result) -> str:
-    least = metric_label("p05_coverage").format(result.metrics["p05_coverage"])
-    return f"95 % of the target's area is covered to {least} or more"
+    known = result.metrics["p05_coverage"]
+    least = metric_label("p05_coverage").format(known)
+    or_more = "" if known.in_words else " or more"  # "more than 99.9 %" says so itself
+    return f"95 % of the target's area is covered to {least}{or_more}"
 
 
 def answer_lines(result: Result, start: Result | None = None) -> list[AnswerLine]:

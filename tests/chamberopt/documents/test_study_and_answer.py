@@ -231,8 +231,14 @@ def test_a_mean_that_is_but_bounded_is_told_by_the_least_covered_places() -> Non
         record=SimpleNamespace(field=SimpleNamespace(reachable_share=1.0), ranges=None),
     )
     least = "95 % of the target's area is covered to 99.87 ± 0.10 % or more"
-    assert answer(result, None).startswith(f"After 420 s {least}; the mean is more than 94 %")
+    assert answer(result, None).startswith(f"After 420 s {least}, and more dents would tell the m")
+    assert "94 %" not in answer(result, None)  # less than 95 % of the area has
     assert on_average(result).endswith(f"; {least}")
+    all_of_it = Estimate(0.99995, 1e-5, in_words="more than 99.99 %")
+    full: Any = SimpleNamespace(
+        **{**vars(result), "metrics": {**metrics, "p05_coverage": all_of_it}}
+    )
+    assert "covered to more than 99.99 %, and more dents" in answer(full, None)
     shown = figures(result, None)
     assert [one.name for one in shown] == ["uniform_coverage", *metrics]
     assert shown[1].result.in_words == "more than 94 %: too few dents"
