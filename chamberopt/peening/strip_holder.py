@@ -7,8 +7,8 @@
     |_____________________________|
                sonotrode
 
-The strip is flush with its holder, and both are of the same steel. It lies along x, or along y where
-it fits only so.
+The strip is flush with its holder, and both are of the same steel. It lies along x, or along y
+where it fits only so.
 """
 
 from __future__ import annotations
