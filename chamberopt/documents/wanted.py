@@ -65,7 +65,7 @@ def time_standing(design: Design, time: Estimate) -> str:
     Args:
         time: the time to 98 % [s], with its whole interval.
     """
-    planned, times = design.process.treatment_time, _times(design)
+    planned, times = design.process.treatment_time, times_wanted(design)
     if planned >= times * time.high:
         return MET
     return NOT_MET if planned < times * time.low else NOT_DECIDED
@@ -89,16 +89,22 @@ def enough_time(
     time, then = metrics.get(TIME), (before or {}).get(TIME)
     if time is None or time.in_words or not 0.0 < time.high < math.inf:
         return None
-    enough = _times(design) * time.high
+    enough = times_wanted(design) * time.high
     if then is not None and not then.in_words and 0.0 < then.high < math.inf:
         enough = max(enough, planned * time.value / then.value)
     return float(math.ceil(round(enough, 6)))
 
 
-def _times(design: Design) -> float:
+def times_wanted(design: Design) -> float:
     """Return the wanted coverage as a multiple of the time to 98 %; 1 if none is asked for."""
     percent = design.process.coverage_percent
     return 1.0 if percent is None else percent / 100.0
+
+
+def multiple_in_words(design: Design) -> str:
+    """Return the wanted coverage as a multiple of a time, such as "twice "; "" for the time."""
+    times = times_wanted(design)
+    return {1.0: "", 2.0: "twice "}.get(times, f"{plain(times)} times ")
 
 
 def may_be_too_short(result: Result) -> bool:
@@ -128,7 +134,7 @@ def time_lines(result: Result) -> list[AnswerLine]:
     if standing == NOT_MET and mean.high < FULL:
         text = f"{leaves}; they are {time_text(design, metrics)}"
     text += f"; wanted are {asked}" if asked else ""
-    is_short = time.value * _times(design) > planned
+    is_short = time.value * times_wanted(design) > planned
     lines = [_of_process(f"{ENOUGH[standing]}: {text}.", is_short)]
     if time.value <= planned and result.record.ranges and slow_end_is_late(result):
         slow = (

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from chamberopt.common.number_text import rounded
 from chamberopt.coverage.metrics import FULL_COVERAGE
 from chamberopt.documents.sheet.rows import AsBuilt, Row
-from chamberopt.documents.wanted import intensity_text
+from chamberopt.documents.wanted import intensity_text, multiple_in_words
 from chamberopt.documents.wording import per_cent, plain
 from chamberopt.peening.strip import StripSize
 from chamberopt.peening.strip_holder import strip_room, why_no_strip
@@ -20,8 +20,10 @@ TIME = "time_to_98_s"
 LENS = "a magnifier of 10 to 30 times (SAE J2277)"
 LEAST_SEEN = 0.2  # share of dents below which it is hard to see how large it is
 LEAST_MISSED = 5e-3  # share of the target out of reach that is told
+# SAE AMS 2580A allows it where no strip can be (as quoted in the forum of shotpeener.com).
 COUPON = (
-    "a coupon of the part's metal in its place, which SAE AMS 2580A allows where no strip can be"
+    "a coupon (SAE AMS 2580A), a flat piece of the part's metal, hardened as the part is, on which "
+    "the dents' diameter or the stress by X-ray is agreed on"
 )
 
 
@@ -86,8 +88,15 @@ def _first_part(result: Result, built: AsBuilt) -> str:
         f"stop it after {plain(after, 2)} s{f', {what},' if what else ''} and look: dents are "
         f"expected on about {told}{more}. Where fewer are seen, the machine peens more slowly than "
         "was simulated: peen on, twice as long each time, until no more dents are seen, and set "
-        "that time."
+        f"{multiple_in_words(result.design)}that time{_why_longer(result)}."
     )
+
+
+def _why_longer(result: Result) -> str:
+    """Return in words for which wanted coverage a time is multiplied; "" if it is not."""
+    percent = result.design.process.coverage_percent
+    is_longer = percent is not None and multiple_in_words(result.design)
+    return f", for the {plain(percent)} % that are wanted" if is_longer else ""
 
 
 def _intensity(result: Result, built: AsBuilt) -> str:
@@ -101,12 +110,17 @@ def _intensity(result: Result, built: AsBuilt) -> str:
     if not why_no_strip(design, StripSize()):
         aim = f"ACCEPT {wanted}" if wanted else "agree on a range in mmA"
         return f"{not_by_dents}: {aim} by strips in the lid, as under Measure first"
+    accept = f"ACCEPT {wanted}" if wanted else "ACCEPT the first part"
     room = strip_room(design)
     if room is None:
-        return f"{not_by_dents}: no lid takes a strip here; {COUPON}"
+        return (
+            f"{not_by_dents}: no lid takes a strip here. {accept} by {COUPON}; held where the "
+            "target is, facing as it does"
+        )
     level = "" if built.level_mm is None else f" {built.level_mm} mm from the sonotrode"
     return (
-        f"{not_by_dents}; no whole strip fits, the largest is {room.in_words}, flush in a steel "
-        f"lid{level} in the place of the part, held at its edges. Its arc heights are no mmA: they "
-        f"ACCEPT a set-up that peens as an approved one did, but no first one. Or {COUPON}"
+        f"{not_by_dents}, and no whole strip fits. {accept} by what is held flush in a steel lid"
+        f"{level} in the place of the part, facing the sonotrode: {room.in_words}, cut from an A "
+        "strip, once its arc heights are correlated with mmA (peen some beside whole strips where "
+        f"both fit, at three intensities or more); or {COUPON}"
     )

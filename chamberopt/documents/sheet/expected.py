@@ -9,6 +9,7 @@ import numpy as np
 
 from chamberopt.common.estimate import Estimate
 from chamberopt.common.number_text import estimate_text, rounded
+from chamberopt.coverage.stress_knowledge import stress_bands
 from chamberopt.design.calibration import why_no_intensity
 from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
 from chamberopt.documents.answer import answer_lines
@@ -28,7 +29,7 @@ from chamberopt.documents.sheet.rows import (
 from chamberopt.documents.wanted import may_be_too_short, wanted_rows
 from chamberopt.documents.wording import metric_label, plain
 from chamberopt.peening.strip import StripSize
-from chamberopt.peening.strip_holder import why_no_strip
+from chamberopt.peening.strip_holder import lies_along_y, why_no_strip
 from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
@@ -78,8 +79,7 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
     calibration = result.design.calibration
     shown = expected_figures(result)
     for row in shown:
-        more = f"; range {row.range_with_unit}" if row.range_text else ""
-        yield shop_name(row), f"{row.label.format(row.result)}{more}"
+        yield shop_name(row), _figure_text(row, result)
     if slow := time_at_slow_end(result):
         yield f"{metric_label(TIME).text}, at the slow end", slow
     wanted = result.design.process.intensity_mmA
@@ -98,6 +98,23 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
             if rest:
                 yield "", f"{over.strip()}{rest}"
     yield "", f"± 95 % intervals. {limits_of_intervals(result, has_groups=True)}"
+
+
+def _figure_text(row: Figure, result: Result) -> str:
+    """Return a figure in words, with its range if it has one.
+
+    One whose law may be wrong by a factor is told to two digits, with that factor. A range that is
+    narrower is left out, as it would tell of more than is known.
+    """
+    band, known = stress_bands(result.design).get(row.name), row.result
+    text = row.label.format(known)
+    if band is not None and known.has_number:
+        about = f"{rounded(row.label.scale(known).value, 2)} {row.label.unit}"
+        text = f"about {about}, within a factor of {plain(band, 2)} by its law"
+        ends = None if result.record.ranges is None else result.record.ranges.figures.get(row.name)
+        if ends and known.value / band < ends.low.value <= ends.high.value < known.value * band:
+            return text
+    return f"{text}; range {row.range_with_unit}" if row.range_text else text
 
 
 def shop_name(row: Figure) -> str:
@@ -170,12 +187,17 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
             known = rough.on_n_strips if rough.is_for_n else f"{plain(rough.value, 2)} mmA"
             known += f"{rough.factor_in_words}, as impacts on the target would give"
         strips = f"{kind} strips {_strip_times(result)}, to calibrate by"
-        if level_mm is not None and not why_no_strip(design, StripSize()):
-            strips += (
-                f"; in the lid in place of the part, {level_mm} mm from the sonotrode, facing it"
+        if level_mm is not None and why_no_strip(design, StripSize()):
+            strips = (
+                f"intensity: no strip of {StripSize()} fits into the lid; by a small one or a "
+                "coupon, as under intensity in Acceptance"
             )
         elif level_mm is not None:
-            strips += f"; no strip of {StripSize()} fits into the lid: see intensity in Acceptance"
+            along = " along y," if lies_along_y(design, StripSize()) else ""
+            strips += (
+                f"; in the lid in place of the part,{along} {level_mm} mm from the sonotrode, "
+                "facing it"
+            )
         yield strips, known
     else:
         text = metric_label("almen_intensity").format(intensity)

@@ -38,7 +38,7 @@ from chamberopt.documents.sheet.rows import (
     with_limits,
 )
 from chamberopt.documents.study import exposed_target
-from chamberopt.documents.wanted import may_be_too_short
+from chamberopt.documents.wanted import may_be_too_short, multiple_in_words
 from chamberopt.documents.wording import plain
 from chamberopt.documents.zones import turned
 
@@ -381,9 +381,10 @@ def _not_set(result: Result) -> str:
     planned, time = result.design.process.treatment_time, result.metrics.get("time_to_98_s")
     known = time is not None and not time.in_words and time.low > planned
     least = f"; the simulation expects {plain(time.low, 2)} s or more" if known and time else ""
-    start = plain(planned)
+    start, sum_or_more = plain(planned), multiple_in_words(result.design)
+    it = f"{sum_or_more}that sum" if sum_or_more else "it"
     return (
         f"THE TIME IS NOT YET SET{least}. Peen {start} s, look as in 5, peen {start} s more, then "
         "twice as long each time, until a look shows no more dents than the one before. Record the "
-        "sum before that look: it is the peening time, ____ s."
+        f"sum before that look: {it} is the peening time, ____ s."
     )

@@ -335,15 +335,41 @@ def test_what_to_measure_first_without_a_calibration(folder: Path) -> None:
 def test_strips_are_set_at_the_height_of_the_target(folder: Path) -> None:
     result = load_result(folder)
     wide = result.design.changed({"chamber.diameter_mm": 140.0})
-    for design, ends in (
-        (
-            result.design,
-            "; no strip of 76.2 x 19 mm fits into the lid: see intensity in Acceptance",
-        ),
+    box = {"shape": "box", "length_mm": 39.5, "width_mm": 80.0, "height_mm": 60.0}
+    long = result.design.changed({"chamber": {**box, "sonotrode_distance_mm": 15.0}})
+    for design, told in (
+        (result.design, "intensity: no strip of 76.2 x 19 mm fits into the lid; by a small one"),
         (wide, "; in the lid in place of the part, 31 mm from the sonotrode, facing it"),
+        (long, "; in the lid in place of the part, along y, 31 mm from the sonotrode, facing it"),
     ):
         rows = first_checks(replace(result, design=design), 31).rows
-        assert next(what for what, *_ in rows if what[0] == "A").endswith(ends)
+        (row,) = (what for what, *_ in rows if told in what)
+        assert ("strips after" in row) == (design is not result.design)  # no times without a strip
+
+
+def test_the_first_part_sets_the_time_for_the_coverage_that_is_wanted(folder: Path) -> None:
+    """200 % is twice the time after which no more dents are seen."""
+    result = load_result(folder)
+    places = looked_places(load_result_arrays(result), 1e-6 * result.record.field.gauge_mm2)
+    built = AsBuilt((50.0,), places=[one._replace(density=2.0) for one in places])
+    for percent, told in (
+        (None, "set that time."),
+        (100.0, "set that time."),
+        (200.0, "set twice that time, for the 200 % that are wanted."),
+        (150.0, "set 1.5 times that time, for the 150 % that are wanted."),
+    ):
+        design = result.design.changed({"process.coverage_percent": percent})
+        changed = replace(result, design=design)
+        assert dict(acceptance_rows(changed, built))["first part"].endswith(told)
+        peen = rows_of(changed)["To peen a part"]["3 peen"]
+        assert ("twice that sum is the peening time" in peen) == (percent == 200.0)
+
+
+def test_a_depth_is_told_no_closer_than_its_law_is_known(folder: Path) -> None:
+    result = load_result(folder)
+    result.metrics["compression_depth_um"] = Estimate(126.7, 1.4)
+    told = rows_of(result)["Peening, and what to expect"][metric_label("compression_depth_um").text]
+    assert told == "about 130 µm, within a factor of 1.6 by its law"
 
 
 def test_a_part_is_accepted_by_places_shares_and_strips(folder: Path) -> None:
@@ -376,7 +402,9 @@ def test_a_part_is_accepted_by_places_shares_and_strips(folder: Path) -> None:
     room = strip_room(result.design)
     assert room is not None
     assert room.disc == pytest.approx(50.0, rel=0.01)
-    assert f"a disc of {room.disc:g} mm, flush in a steel lid 31 mm from" in rows["intensity"]
+    assert f"or a disc of {room.disc:g} mm, cut from an A strip" in rows["intensity"]
+    assert "flush in a steel lid 31 mm from the sonotrode" in rows["intensity"]
+    assert "or a coupon (SAE AMS 2580A), a flat piece of the part's metal" in rows["intensity"]
     wide = replace(result, design=result.design.changed({"chamber.diameter_mm": 140.0}))
     told = dict(acceptance_rows(wide, built))["intensity"]
     assert told.endswith("agree on a range in mmA by strips in the lid, as under Measure first")
