@@ -1,7 +1,7 @@
 """The part of a design: its mesh file, its pose in the chamber, and the target to be covered."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -123,15 +123,24 @@ class Selection(FileTable):
     @property
     def in_words(self) -> str:
         """What is chosen, by the keys that are given, such as "the surface root of its file"."""
+        return self.words_at(None)
+
+    def words_at(self, first_mm: Sequence[float] | None) -> str:
+        """Return what is chosen in words, with the first face's place in another frame.
+
+        Args:
+            first_mm: that place, (3,); None: that of the file, which is named then.
+        """
         named = self.surface != ("all",)
         words = [f"the surface {' and '.join(self.surface)} of its file"] if named else []
         if self.faces:
             count = len(self.faces)
             several = "one face" if count == 1 else f"{count} faces"
-            place = ", ".join(plain(round(x, 1) + 0.0) for x in self.faces[0].at_mm)
+            place = ", ".join(plain(round(x, 1) + 0.0) for x in first_mm or self.faces[0].at_mm)
             alike = ", with all faces alike" if any(one.alike for one in self.faces) else ""
             first = "" if count == 1 else "such as "
-            words.append(f"{several}, {first}at ({place}) mm of its file{alike}")
+            of_file = " of its file" if first_mm is None else ""
+            words.append(f"{several}, {first}at ({place}) mm{of_file}{alike}")
         if self.direction is not None and self.angle_deg is not None:
             low, high = map(plain, self.angle_deg)
             way = ", ".join(map(plain, self.direction))
@@ -173,11 +182,11 @@ class Target(Selection):
         if self.cut and self.box_mm is None:
             yield Problem("cut", "given without box_mm; give the box at whose sides to cut")
 
-    @property
-    def in_words(self) -> str:
-        """What is chosen, by the keys that are given."""
+    def words_at(self, first_mm: Sequence[float] | None) -> str:
         beside = f"with {plain(self.beside_mm or 0.0)} mm of the faces that go on from it"
-        return "; ".join(filter(None, (super().in_words, beside if self.beside_mm else "")))
+        return "; ".join(
+            filter(None, (super().words_at(first_mm), beside if self.beside_mm else ""))
+        )
 
     @property
     def element(self) -> float | None:

@@ -87,7 +87,7 @@ NO_COVERAGE = "No page shows the coverage by place: {}."
 COVERAGE_HEAD = 20.0  # mm, of title and sentences above the picture of the coverage
 COVERAGE = (
     "Share of the surface that is dented after the treatment time, simulated, in windows round "
-    "each place. Numbers: where to look, see Acceptance; one that no view shows is hidden."
+    "each place. Numbers: where to look, see Acceptance, also for one that no view shows."
 )
 COLUMNS = (88.0, 62.0, 36.0)  # mm, of a table with a head
 MM_PER_PT = 25.4 / 72.0
@@ -317,6 +317,7 @@ def write_sheet(
             None if push is None else (float(push[0]), float(push[1]), float(push[2])),
             float(tetrahedron_volumes(part.vertices, part.triangles).sum()),
             places,
+            part.file,
         )
         sheet = process_sheet(loaded, built, revision)
         limits = slit_limits(loaded) | chamber_limits(loaded) | reference_limits(loaded, openings)

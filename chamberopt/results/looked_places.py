@@ -26,14 +26,15 @@ class LookedPlace(NamedTuple):
     Attributes:
         at: its middle on the surface, in the chamber's frame [m], (3,).
         normal: out of the part, (3,).
-        of_file_mm: the same place in the frame of the part's file.
+        along: axis of the chamber along which the target is longest, 0 to 2, and where the place is
+            along it, from -1 at the target's lower end to 1 at its upper end.
         density: of the dents expected in it after the treatment time, such that its coverage is
             1 - exp(-density).
     """
 
     at: np.ndarray
     normal: np.ndarray
-    of_file_mm: tuple[float, float, float]
+    along: tuple[int, float]
     density: float
 
     def coverage(self, times: float) -> float:
@@ -44,8 +45,7 @@ class LookedPlace(NamedTuple):
 def looked_places(arrays: ResultArrays, gauge: float) -> list[LookedPlace]:
     """Return the least covered patches of a target, apart from each other, the least first.
 
-    There are none where too few dents were simulated to tell places apart, or where the part's file
-    is not known.
+    There are none where too few dents were simulated to tell places apart.
 
     Args:
         gauge: area of a window [m²].
@@ -56,11 +56,14 @@ def looked_places(arrays: ResultArrays, gauge: float) -> list[LookedPlace]:
     shares = np.repeat(areas(mesh.vertices, corners) / 3.0, 3)
     weight = np.bincount(corners.ravel(), shares, len(mesh.vertices))
     known = (weight > 0.0) & (fields["reachable"] > 0.5) & (fields["resolved"] > 0.5)
-    if not known.any() or part.file is None:
+    if not known.any():
         return []
     place, weight = mesh.vertices[known].astype(float), weight[known]
     covered = coverage_from_dent_density(fields["dent_density"][known].astype(float))
     side = float(np.linalg.norm(np.ptp(place, axis=0))) / PATCHES
+    axis = int(np.ptp(place, axis=0).argmax())
+    low, high = float(place[:, axis].min()), float(place[:, axis].max())
+    half, middle_of_all = 0.5 * (high - low), 0.5 * (low + high)
     cell = np.column_stack([np.floor(place / side), mesh.face[known]])
     _, patch = np.unique(cell, axis=0, return_inverse=True)
     patch = patch.reshape(-1)
@@ -75,9 +78,9 @@ def looked_places(arrays: ResultArrays, gauge: float) -> list[LookedPlace]:
         is_apart = all(np.linalg.norm(at - other.at) > 2.0 * side for other in found)
         if area[one] < LEAST_WINDOWS * gauge or not is_apart:
             continue
-        x, y, z = (1e3 * (at - part.file.shift) @ part.file.rotation).tolist()
+        along = axis, float((at[axis] - middle_of_all) / half)
         density = -float(np.log1p(-min(mean[one], 1.0 - 1e-9)))
-        found.append(LookedPlace(at, mesh.normal[known][nearest], (x, y, z), density))
+        found.append(LookedPlace(at, mesh.normal[known][nearest], along, density))
         if len(found) == MOST_PLACES:
             break
     return found

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from chamberopt.common.number_text import rounded
 from chamberopt.coverage.metrics import FULL_COVERAGE
 from chamberopt.documents.sheet.rows import AsBuilt, Row
@@ -15,9 +17,12 @@ from chamberopt.peening.strip_holder import strip_room, why_no_strip
 
 if TYPE_CHECKING:
     from chamberopt.results.load import Result
+    from chamberopt.results.looked_places import LookedPlace
 
 TIME = "time_to_98_s"
 LENS = "a magnifier of 10 to 30 times (SAE J2277)"
+ASIDE = 0.35  # least share of a normal along an axis for a surface to be told to look that way
+NEAR_END = 1.0 / 3.0  # share of half the target's length from which on a place is near its end
 LEAST_SEEN = 0.2  # share of dents below which it is hard to see how large it is
 LEAST_MISSED = 5e-3  # share of the target out of reach that is told
 # SAE AMS 2580A allows it where no strip can be (as quoted in the forum of shotpeener.com).
@@ -35,13 +40,14 @@ def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     """
     places = built.places
     if places:
+        kind = _kind(result, built)
         listed = "; ".join(
-            f"{number} at ({', '.join(plain(round(x, 1) + 0.0) for x in one.of_file_mm)})"
+            f"{number} at {_place_mm(one)} mm, {_lies(one, kind)}"
             for number, one in enumerate(places, 1)
         )
         yield (
             "places to look at",
-            f"{listed} mm of the part's file, numbered on the page Coverage by place: where the "
+            f"{listed}; numbered on the page Coverage by place: where the "
             f"fewest dents are expected, off the edges; by {LENS}",
         )
         if text := _first_part(result, built):
@@ -58,6 +64,32 @@ def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         "for the same time once more and look again; REJECT it if it is still less.",
     )
     yield "intensity", _intensity(result, built)
+
+
+def _kind(result: Result, built: AsBuilt) -> str:
+    """Return in words what surface a place to look at is on, as far as the target tells."""
+    surface = result.design.part.target.surface
+    if surface != ("all",) and len(surface) == 1:
+        return f"on the surface {surface[0]}"
+    return "on a fillet" if built.radii else "on a face"
+
+
+def _place_mm(one: LookedPlace) -> str:
+    return f"({', '.join(plain(round(1e3 * x, 1) + 0.0) for x in one.at.tolist())})"
+
+
+def _lies(one: LookedPlace, kind: str) -> str:
+    """Return in words where a place lies: which way its surface looks, and near which end."""
+    ways = (("to −x", "to +x"), ("to −y", "to +y"), ("down", "up"))
+    looks = [
+        ways[axis][int(one.normal[axis] > 0.0)]
+        for axis in np.argsort(-np.abs(one.normal)).tolist()
+        if abs(one.normal[axis]) > ASIDE
+    ]
+    axis, share = one.along
+    ends = ("−x end", "+x end"), ("−y end", "+y end"), ("lower end", "upper end")
+    end = "the middle" if abs(share) < NEAR_END else f"the {ends[axis][int(share > 0.0)]}"
+    return f"{kind} that looks {' and '.join(looks)}, near {end} of the target"
 
 
 def _first_part(result: Result, built: AsBuilt) -> str:

@@ -50,12 +50,11 @@ def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         yield "holder", f"none: {out}{'' if padded else f'; {held}'}"
     rows = []
     for number, way in enumerate(openings):
-        frame = "" if number else " in the chamber's frame"
         how = f"; {MOUNTED[built.mountings[number]]}" if built.mountings else ""
         beyond = _beyond(way, openings, held, how)
         cut = opening_in_words(way, clearance_of(result))
         beyond += _across(result, way)
-        rows.append(("opening", f"{cut} at {place_of(way, openings)} mm{frame}; {beyond}"))
+        rows.append(("opening", f"{cut} at {place_of(way, openings)} mm; {beyond}"))
     yield from first_rows(rows, "openings")
     if ribs := thin_ribs(openings):
         between = " and ".join(
@@ -78,7 +77,7 @@ def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
                 ", ".join(plain(round(x, 3) + 0.0) for x in three)
                 for three in (one.place_mm, holder.axis)
             )
-            text += f", from ({at}) mm along ({along}) in the chamber's frame"
+            text += f", from ({at}) mm along ({along})"
         if holder is not None and name == "holder":
             text += _flanges(holder) + _grip(holder)
             text += THROUGH if holder.kind == "arbor" else ""

@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.key_words import in_words, unit_of
 from chamberopt.design.intensity import WantedIntensity
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
     from chamberopt.chamber.checks.openings import Mounting, Opening
     from chamberopt.chamber.checks.strips import StripOfTarget
     from chamberopt.chamber.fixture import Plug
+    from chamberopt.chamber.part import PartOfFile
+    from chamberopt.design.part import Selection
     from chamberopt.design.shot import ShotTable
     from chamberopt.design.sonotrode import VibratingFace
     from chamberopt.results.load import Result
@@ -25,6 +29,7 @@ if TYPE_CHECKING:
 Row = tuple[str, str]  # a name and its value, or "" and a sentence
 
 OF_COMMANDS = r" \((?:[^()]*--[^()]*|no source read|chamberopt [a-z]+|docs/[^()]*)\)"
+OF_FRAME = r"(?<=\) mm) in the chamber(?:'s frame)?\b"
 MOST_ROWS = 4  # sizes of shot, or further sonotrodes; the report has all of them
 
 
@@ -46,14 +51,25 @@ class AsBuilt(NamedTuple):
     push: tuple[float, float, float] | None = None  # mean force of the shot on the part [N]
     volume: float = 0.0  # of the part [m³]
     places: Sequence[LookedPlace] = ()  # of the target to look at, the least covered first
+    file: PartOfFile | None = None  # with its pose in the chamber
+
+    def chosen_in_words(self, chosen: Selection) -> str:
+        """Return what is chosen of the part in words, with a place in the chamber's frame."""
+        place = None
+        if self.file is not None and chosen.faces:
+            at = 1e-3 * np.array(chosen.faces[0].at_mm)
+            place = (1e3 * (self.file.rotation @ at + self.file.shift)).tolist()
+        return for_the_shop(chosen.words_at(place))
 
 
 def for_the_shop(text: str) -> str:
     """Return a text without what is for who designs: commands, options, and sources of rules.
 
-    Its minus signs are as long as a plus.
+    Its minus signs are as long as a plus. The chamber's frame is left out after places in it, as a
+    sheet names it once.
     """
-    return re.sub(r"(?<!\w)-(?=\d)", "−", re.sub(OF_COMMANDS, "", text))
+    text = re.sub(OF_FRAME, "", re.sub(OF_COMMANDS, "", text))
+    return re.sub(r"(?<!\w)-(?=\d)", "−", text)
 
 
 def first_rows(rows: Sequence[Row], what: str, most: int = MOST_ROWS) -> Iterator[Row]:

@@ -48,6 +48,10 @@ if TYPE_CHECKING:
     from chamberopt.chamber.checks.strips import StripOfTarget
     from chamberopt.results.load import Result
 
+FRAME = (
+    "(x, y, z) in mm in the chamber's frame, from the room's axis and the sonotrode's face: x and "
+    "y as in the plan, z up"
+)
 LEAST_SLIT_MM = 0.2  # of both sides of a face, by heart: it vibrates and must touch nothing
 SQUARE = 0.9998  # cosine between a face's normal and an axis from which on it looks along the axis
 SAME_MM = 0.02  # lengths that differ by less count as equal
@@ -132,6 +136,8 @@ def part_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
             f"sonotrode to lowest point{' between the walls' * bool(built.openings)}",
             with_limits(result, "chamber.sonotrode_distance_mm", text),
         )
+    start = "; on the part as it stands before it turns" if turn is not None else ""
+    yield "places on this sheet", f"{FRAME}{start}"
     if turn is not None:
         swing = (
             f"{plain(turn.angle_deg or 0.0)}° to each side at {plain(turn.frequency_hz or 0)} Hz"
@@ -143,7 +149,7 @@ def part_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         yield "target", area
     # A strip is told in a row of its own.
     chosen = part.target.model_copy(update={} if strip is None else {"box_mm": None})
-    if words := for_the_shop(chosen.in_words):
+    if words := built.chosen_in_words(chosen):
         radii = " and ".join(plain(1e3 * one) for one in built.radii)
         yield "target, chosen by", f"fillets of {radii} mm: {words}" if radii else words
     if strip is not None:

@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -132,8 +133,8 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
     tables = setting_tables(bore, AsBuilt((50.0,), openings))
     rows = next(one for one in tables if one.caption == "Chamber").rows
     assert [text for name, text in rows if name == "opening"] == [
-        "60.4 × 80.4 mm in the wall at +y, its middle at (0, 40, 62.4) mm in the chamber's frame; "
-        "the part stands out by 9.3 mm: clamp it there",
+        "60.4 × 80.4 mm in the wall at +y, its middle at (0, 40, 62.4) mm; the "
+        "part stands out by 9.3 mm: clamp it there",
         "12.4 × 80.4 mm in the wall at −x, its middle at (−40, 0, 62.4) mm; the part fills it",
         "12 mm of the ceiling, which ends on the part, at (0, 0, 119) mm; the part stands out "
         "by 1.2 mm",
@@ -196,6 +197,10 @@ def test_what_a_shop_needs_of_pose_target_strip_and_flanges(folder: Path) -> Non
     faces = ({"at_mm": (1.0, 2.25, -0.04), "alike": True}, {"at_mm": (0.0, 0.0, 0.0)})
     named = result.design.changed({"part.target": {"surface": "root", "faces": faces}})
     rows = rows_of(replace(result, design=named))["Part and pose"]
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    file: Any = SimpleNamespace(rotation=turn, shift=np.array([5e-5, 0.0, 0.01]))
+    in_chamber = AsBuilt((50.0,), file=file).chosen_in_words(named.part.target)
+    assert "2 faces, such as at (−2.2, 1, 10) mm, with all faces alike" in in_chamber
     assert rows["target, chosen by"] == (
         "the surface root of its file; 2 faces, such as at (1, 2.2, 0) mm of its file, with "
         "all faces alike"
@@ -383,11 +388,13 @@ def test_a_part_is_accepted_by_places_shares_and_strips(folder: Path) -> None:
     places = looked_places(arrays, 1e-6 * result.record.field.gauge_mm2)
     assert [one.density for one in places] == sorted(one.density for one in places)
     assert 1 < len(places) <= MOST_PLACES
-    part = arrays.chamber.part
-    assert part.file is not None
+    target = arrays.chamber.part.vertices[arrays.chamber.part.triangles[arrays.chamber.part.target]]
+    low, high = target.reshape(-1, 3).min(axis=0), target.reshape(-1, 3).max(axis=0)
     for one in places:
-        back = part.file.rotation @ (1e-3 * np.array(one.of_file_mm)) + part.file.shift
-        np.testing.assert_allclose(back, one.at, atol=1e-9)
+        axis, share = one.along
+        assert axis == (high - low).argmax()
+        exact = (2.0 * one.at - low - high)[axis] / (high - low)[axis]
+        assert share == pytest.approx(exact, abs=0.05)
     mean = result.metrics["mean_coverage"].value
     assert places[0].coverage(1.0) < mean
     few = AsBuilt((50.0,), places=[one._replace(density=0.1) for one in places])
@@ -397,6 +404,13 @@ def test_a_part_is_accepted_by_places_shares_and_strips(folder: Path) -> None:
     rows = dict(acceptance_rows(result, built))
     half = min(0.5 * result.metrics["time_to_98_s"].value, 5.0)
     assert f"stop it after {plain(half, 2)} s" in rows["first part"]
+    tilted = np.array([-0.8, 0.0, -0.6])
+    lies = [one._replace(normal=tilted, along=(0, 0.9 * k - 0.9)) for k, one in enumerate(places)]
+    told = dict(acceptance_rows(result, built._replace(places=lies, radii=[2e-3])))
+    x, y, z = (plain(round(1e3 * x, 1) + 0.0) for x in places[0].at.tolist())
+    first = f"1 at ({x}, {y}, {z}) mm, on a fillet that looks to −x and down, near the −x end of"
+    assert told["places to look at"].startswith(first)
+    assert "down, near the middle of the target" in told["places to look at"]
     assert f"{per_cent(places[0].coverage(half / 5.0))} at 1" in rows["first part"]
     assert f"98 % or more of each of places 1 to {len(places)}" in rows["ACCEPT or REJECT"]
     room = strip_room(result.design)
