@@ -202,7 +202,7 @@ def _edge_that_fits(size: StripSize, outline: np.ndarray) -> np.ndarray:
 
 def _turned(edge: np.ndarray) -> np.ndarray:
     """Return the corners (n, 2) of a strip turned by 90 degrees."""
-    return np.c_[-edge[:, 1], edge[:, 0]]
+    return np.asarray(edge[:, ::-1] * [-1.0, 1.0])
 
 
 def _edge_mm(size: StripSize) -> np.ndarray:

@@ -18,6 +18,8 @@ MOST_PLACES = 3
 # the least of many would tell of luck. Places are two cubes apart.
 PATCHES = 8.0
 LEAST_WINDOWS = 3.0
+SHORT = 0.25  # side of the target over its longest, below which it has no ends along that side
+ACROSS = 0.7  # share of a normal along an axis from which on the axis is not along the surface
 
 
 class LookedPlace(NamedTuple):
@@ -26,8 +28,9 @@ class LookedPlace(NamedTuple):
     Attributes:
         at: its middle on the surface, in the chamber's frame [m], (3,).
         normal: out of the part, (3,).
-        along: axis of the chamber along which the target is longest, 0 to 2, and where the place is
-            along it, from -1 at the target's lower end to 1 at its upper end.
+        along: axis of the chamber, 0 to 2, and where the place is along it, from -1 at the target's
+            lower end to 1 at its upper end. It is the axis, of those along the surface there, on
+            which the place is nearest to an end.
         density: of the dents expected in it after the treatment time, such that its coverage is
             1 - exp(-density).
     """
@@ -61,9 +64,8 @@ def looked_places(arrays: ResultArrays, gauge: float) -> list[LookedPlace]:
     place, weight = mesh.vertices[known].astype(float), weight[known]
     covered = coverage_from_dent_density(fields["dent_density"][known].astype(float))
     side = float(np.linalg.norm(np.ptp(place, axis=0))) / PATCHES
-    axis = int(np.ptp(place, axis=0).argmax())
-    low, high = float(place[:, axis].min()), float(place[:, axis].max())
-    half, middle_of_all = 0.5 * (high - low), 0.5 * (low + high)
+    low, high = place.min(axis=0), place.max(axis=0)
+    is_short = high - low < SHORT * (high - low).max()
     cell = np.column_stack([np.floor(place / side), mesh.face[known]])
     _, patch = np.unique(cell, axis=0, return_inverse=True)
     patch = patch.reshape(-1)
@@ -78,9 +80,11 @@ def looked_places(arrays: ResultArrays, gauge: float) -> list[LookedPlace]:
         is_apart = all(np.linalg.norm(at - other.at) > 2.0 * side for other in found)
         if area[one] < LEAST_WINDOWS * gauge or not is_apart:
             continue
-        along = axis, float((at[axis] - middle_of_all) / half)
+        normal = mesh.normal[known][nearest]
+        share = np.where(is_short, 0.0, (2.0 * at - low - high) / np.maximum(high - low, 1e-12))
+        axis = int(np.where(np.abs(normal) > ACROSS, 0.0, np.abs(share)).argmax())
         density = -float(np.log1p(-min(mean[one], 1.0 - 1e-9)))
-        found.append(LookedPlace(at, mesh.normal[known][nearest], along, density))
+        found.append(LookedPlace(at, normal, (axis, float(share[axis])), density))
         if len(found) == MOST_PLACES:
             break
     return found

@@ -127,8 +127,9 @@ def _first_part(result: Result, built: AsBuilt) -> str:
 def _why_longer(result: Result) -> str:
     """Return in words for which wanted coverage a time is multiplied; "" if it is not."""
     percent = result.design.process.coverage_percent
-    is_longer = percent is not None and multiple_in_words(result.design)
-    return f", for the {plain(percent)} % that are wanted" if is_longer else ""
+    if percent is None or not multiple_in_words(result.design):
+        return ""
+    return f", for the {plain(percent)} % that are wanted"
 
 
 def _intensity(result: Result, built: AsBuilt) -> str:
