@@ -14,7 +14,13 @@ from chamberopt.chamber.matters import MatterKind
 from chamberopt.common.number_text import plain
 from chamberopt.geometry.cut import cut_at_box, facets
 from chamberopt.geometry.faces import Faces
-from chamberopt.geometry.outline import convex_hull, fitted_circle, frame_along, narrowest_rectangle
+from chamberopt.geometry.outline import (
+    convex_hull,
+    distances_in_plan,
+    fitted_circle,
+    frame_along,
+    narrowest_rectangle,
+)
 from chamberopt.geometry.thickness import depth_below
 from chamberopt.geometry.triangles import centre_of_mass, unit_normals
 from sim_core import computed_once
@@ -27,9 +33,10 @@ FLAT_DEG = 1.0  # largest angle in a flat face: fillets beside it are no part of
 # how far apart they are over the part's size: no vice takes a shaft by its ends.
 MOST_FLAT, LEAST_JAW, LEAST_OF_ALL, JAWS_OPEN = 20, 30e-6, 0.15, 0.8
 SEEN_OUT = 1e-3  # m by which a part stands out of a side
-# Of a round face: how far its corners may be off a circle, over its radius, and the sum of its area
-# vectors over its area.
-OFF_ROUND, ALL_WAYS = 0.02, 0.2
+# Of a round face: how far its corners may be off a circle, over its radius, the sum of its area
+# vectors over its area, and the least share of its area that looks along any way across its axis.
+# Half of it does of a full round, and 0.38 where two flats opposite leave four fifths of its girth.
+OFF_ROUND, ALL_WAYS, EACH_WAY = 0.02, 0.2, 0.38
 # Faces that are looked at for it, which end where they turn by so much; cosine up to which a face
 # is a side; and least share of a round's surface that a keyway and facets leave.
 MOST_FACES, CREASE_DEG, LEVEL, SLOTTED = 8, 30.0, 0.02, 0.8
@@ -183,8 +190,9 @@ def _round_end(
 def _round_radius(corners: np.ndarray, outside: np.ndarray, axis: int) -> float:
     """Return the radius [m] of what stands out if it is a round about an axis; 0 if it is none.
 
-    All of it is as far from the axis, it goes all round, it is no bore, and it is long enough for a
-    clamp.
+    All of it is as far from the axis, its flat sides too, it goes all round, it is no bore, and it
+    is long enough for a clamp. The four edges of a slab are as far from its axis, and so are the
+    ends of the sides of a rectangle with rounded corners: neither is a round.
 
     Args:
         corners: of all triangles of the part [m], (m, 3, 3).
@@ -197,12 +205,18 @@ def _round_radius(corners: np.ndarray, outside: np.ndarray, axis: int) -> float:
     across = np.delete(corners[own], axis, axis=2).reshape(-1, 2)
     middle, radius = fitted_circle(across)
     off = np.abs(np.linalg.norm(across - middle, axis=1) - radius).max()
+    inner = distances_in_plan(across.reshape(-1, 3, 2), middle).min()
+    is_near = inner < (math.cos(math.radians(0.5 * CREASE_DEG)) - OFF_ROUND) * radius
     normal, area = np.delete(unit_normals(corners[own]), axis, axis=1), outside[own]
-    is_even = np.linalg.norm(area @ normal) < ALL_WAYS * area.sum()
+    least = float(np.linalg.eigvalsh((normal.T * area) @ normal)[0])
+    is_even = np.linalg.norm(area @ normal) < ALL_WAYS * area.sum() and (
+        least > EACH_WAY * area.sum()
+    )
     aside = np.delete(corners[own].mean(axis=1), axis, axis=1) - middle
     is_outer = float(area @ (normal * aside).sum(axis=1)) > 0.0
     is_long = float(area.sum()) >= 2.0 * math.pi * radius * DEEP * SLOTTED
-    return radius if off < OFF_ROUND * radius and is_even and is_outer and is_long else 0.0
+    is_round = off < OFF_ROUND * radius and not is_near and is_even
+    return radius if is_round and is_outer and is_long else 0.0
 
 
 class ThinGrip(NamedTuple):

@@ -121,3 +121,52 @@ def test_a_shank_with_a_key_and_an_end_face_is_held_by_its_diameter() -> None:
     square = trimesh.creation.box((20.0, 20.0, 30.0))
     sides = 1e-6 * square.area_faces
     assert _round_end(1e-3 * square.vertices, np.asarray(square.faces), sides, [2]) == 0.0
+
+
+def rounded(length: float, width: float, corner: float, deep: float, sides: int) -> Manifold:
+    """A plate of these sides along x and y with rounded corners [mm], from 0 up.
+
+    Args:
+        sides: of each full round.
+    """
+    high = [length / 2.0 - corner, width / 2.0 - corner]
+    posts = [
+        Manifold.cylinder(deep, corner, circular_segments=sides).translate([i * x, j * y, 0.0])
+        for x, y in [high]
+        for i in (-1.0, 1.0)
+        for j in (-1.0, 1.0)
+    ]
+    return Manifold.batch_hull(posts)
+
+
+@pytest.mark.parametrize(
+    ("body", "axis", "radius_mm"),
+    [
+        (rounded(90, 70, 8, 10, 64), 0, 0.0),  # a flange: the edges of its rim lie on one circle
+        (rounded(90, 70, 8, 10, 64), 1, 0.0),
+        (rounded(90, 70, 8, 10, 64), 2, 0.0),
+        (rounded(90, 70, 2, 10, 64), 2, 0.0),  # so do the ends of its sides, nearly
+        (rounded(60, 60, 3, 20, 64), 2, 0.0),
+        (rounded(60, 50, 20, 20, 64), 2, 0.0),
+        (rounded(40, 40, 19.9999, 20, 64), 2, 20.0),  # a round
+        (rounded(40, 40, 19.9999, 20, 16), 2, 20.0),  # of few sides
+        # Flats opposite on a shank of 40 mm: two quarters of it left, and nearly all.
+        (
+            Manifold.cylinder(20, 20, circular_segments=96) ^ Manifold.cube((28.3, 60, 60), True),
+            2,
+            0.0,
+        ),
+        (
+            Manifold.cylinder(20, 20, circular_segments=96) ^ Manifold.cube((39, 60, 60), True),
+            2,
+            20.0,
+        ),
+    ],
+)
+def test_what_is_as_far_from_an_axis_by_its_edges_alone_is_no_round(
+    body: Manifold, axis: int, radius_mm: float
+) -> None:
+    mesh = solid(body)
+    area, triangles = 1e-6 * mesh.area_faces, np.asarray(mesh.faces)
+    found = 1e3 * _round_end(1e-3 * mesh.vertices, triangles, area, [axis])
+    assert found == pytest.approx(radius_mm, rel=1e-3)
