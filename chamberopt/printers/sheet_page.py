@@ -313,7 +313,7 @@ def write_sheet(
             radii_of_target(design, part),
             largest_flat_face(part),
             part_is_ceiling(chamber),
-            outside_clamp(chamber).text,
+            outside_clamp(chamber, design.effects.part_turn is not None).text,
             None if push is None else (float(push[0]), float(push[1]), float(push[2])),
             float(tetrahedron_volumes(part.vertices, part.triangles).sum()),
             places,

@@ -50,8 +50,8 @@ LEAST_RIB, RIM_STEP = 2e-3, 2.5e-4
 Form = Literal["rectangle", "round", "other", "edge"]
 """How an opening is cut: as a rectangle, drilled, along the part's section, or the wall ends."""
 
-Mounting = Literal["part goes in", "wall goes over", "split"]
-"""How part and wall come together, from outside: or the wall is in two pieces there."""
+Mounting = Literal["part goes in", "wall goes over", "lies on it", "split"]
+"""How part and wall come together, from outside or from above: or the wall is in two pieces."""
 
 
 class Opening(NamedTuple):
@@ -93,11 +93,14 @@ def walls_end_at(openings: Sequence[Opening]) -> float | None:
 def mounting(part: Part, opening: Opening, clear: float) -> Mounting:
     """Return how a part comes into an opening of a wall.
 
-    A wall is split only if neither what is inside nor what is outside passes its opening.
+    A side wall that ends on the part carries it. Another one is split only if neither what is
+    inside nor what is outside passes its opening.
 
     Args:
         clear: room between part and wall [m].
     """
+    if walls_end_at([opening]) is not None:
+        return "lies on it"
     frame = frame_along(np.array(opening.way))
     level = float(np.dot(opening.place, opening.way))
     inside, outside = passes_opening(part.vertices @ frame.T, part.triangles, level, clear)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.checks.openings import find_openings, walls_end_at
 from chamberopt.chamber.layout.end import DEEP
 from chamberopt.chamber.layout.target import area_in_mm2, nearest_axis
 from chamberopt.chamber.matters import MatterKind
@@ -44,6 +45,9 @@ MOST_FACES, CREASE_DEG, LEVEL, SLOTTED = 8, 30.0, 0.02, 0.8
 # [m] or over the part's least size, and the centre of mass lies further beyond them than so many
 # lengths of the grip. Metal is measured to so much [m]; sides of an end lean by less than a cosine.
 THIN_METAL, THIN_SHARE, FAR_OUT, THICK, SIDEWAYS = 4e-3, 0.15, 3.0, 20e-3, 0.7
+
+
+ON_WALLS = "clamps above it that press it down on the walls, on which it lies"
 
 
 class Clamp(NamedTuple):
@@ -147,20 +151,26 @@ def free_outside(chamber: Chamber) -> np.ndarray:
 
 
 @computed_once(4)
-def outside_clamp(chamber: Chamber) -> Clamp:
+def outside_clamp(chamber: Chamber, turns: bool = False) -> Clamp:
     """Return what a part that stands out of its chamber is clamped by there, by its form.
 
-    It is two flat faces that jaws reach far over, or else the largest round, or else any two flat
-    faces, as the sides of a blade's platform: its airfoil is no place for jaws. The text is empty
-    if there is none of them.
+    A part that lies on the walls is pressed down on them. For others it is two flat faces that jaws
+    reach far over, or else the largest round, or else any two flat faces, as the sides of a blade's
+    platform: its airfoil is no place for jaws. The text is empty if there is none of them.
+
+    Args:
+        turns: a drive turns the part, so that a round is taken by what turns with it.
     """
+    if walls_end_at(find_openings(chamber)) is not None:
+        return Clamp(ON_WALLS, way=(0.0, 0.0, 1.0))
     part, outside = chamber.part, free_outside(chamber)
     jaws = flat_jaws(part.vertices, part.triangles, outside)
     if jaws.text and not jaws.is_shallow:
         return jaws
     axes = {"xyz".index(side[-1]) for side in sides_out(chamber)}
     if radius := _round_end(part.vertices, part.triangles, outside, axes):
-        return Clamp(f"a collet or vee blocks round its diameter of {plain(2e3 * radius)} mm")
+        by = "a collet or chuck, such as" if turns else "a collet or vee blocks"
+        return Clamp(f"{by} round its diameter of {plain(2e3 * radius)} mm")
     if jaws.text:
         return jaws
     return flat_jaws(part.vertices, part.triangles, outside, least_of_all=0.0)

@@ -329,10 +329,10 @@ def _built(
             words = {"part.rotate_deg": f"{pose_in_words(given.mesh, given.known, placed)}: {why}"}
             if turning is not None:
                 words["part.rotate_deg"] = why if setup.stance.spindle else TURNED
-                its = "its shaft is" if setup.stance.spindle is None else "its ends are"
-                words["effects.part_turn"] = (
-                    f"{MatterKind.TURNED}, at {RPM:g} rpm: {its} sealed in the wall"
-                )
+                how = "its shaft is sealed in the wall"
+                if setup.stance.spindle is not None:
+                    how = "the shop chooses which of its ends is driven, the other is guided"
+                words["effects.part_turn"] = f"{MatterKind.TURNED}, at {RPM:g} rpm: {how}"
             own = floor_reasons(floor, setup.goes_out, setup.ball)
             reasons = {**setup.reasons, **words, **own}
             made = checked(tables, reasons, floor, given.known, given.mesh, wanted.shop)

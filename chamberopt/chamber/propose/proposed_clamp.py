@@ -34,7 +34,7 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     keys = {"kind": "bore", "clearance_mm": clearance_mm}
     tables = with_table(made.tables, "sonotrode", "holder", keys)
     by = f" by {clamp.text}" if (clamp := _clamp(made)).text else ""
-    holds = "clamped" if made.design.effects.part_turn is None else "chucked, and turned,"
+    holds = "turned" if _turns(made) else "clamped"
     sides = ", ".join(sides_out(made.chamber))
     text = (
         f"{holds} where it stands out of the chamber at {sides}{by}; the "
@@ -49,6 +49,11 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
         )
     reasons = {**made.reasons, "holder.kind": text}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
+
+
+def _turns(made: Proposal) -> bool:
+    """Return whether a drive turns the part."""
+    return made.design.effects.part_turn is not None
 
 
 def why_not_turned(made: Proposal) -> str:
@@ -87,6 +92,8 @@ def _mounting(made: Proposal, clearance: float) -> str:
     """
     chamber = made.chamber
     ways = {mounting(chamber.part, one, clearance) for one in find_openings(chamber)}
+    if "lies on it" in ways and "split" not in ways:
+        return "is in one piece there: the part is laid on it from above"
     side = "above" if sides_out(made.chamber) == ["+z"] else "outside"
     if "split" in ways or not ways:
         return "is split there"
@@ -137,7 +144,7 @@ def _clamp(made: Proposal) -> Clamp:
 
     It is what `outside_clamp` finds, or else surfaces by name.
     """
-    if (found := outside_clamp(made.chamber)).text:
+    if (found := outside_clamp(made.chamber, _turns(made))).text:
         return found
     outside = free_outside(made.chamber)
     known = [

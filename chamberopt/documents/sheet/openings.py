@@ -22,13 +22,19 @@ SQUARE = 0.999  # cosine between a wall's normal and an axis above which the wal
 # m: jaws take what stands out so far; through one opening alone, in a thin wall at least.
 CLAMPED, SHORT = 3e-3, 15e-3
 CLAMP = "clamp it there"
-GUIDED = "guide it there in a bushing, stopped along its axis"  # of a part that turns
+# Of a part that turns: by its only end, and by one of several.
+DRIVEN = "drive it there, stopped along its axis"
+EITHER = (
+    "drive it by one such end, the shop's choice, and guide it by the other in a bushing, stopped "
+    "along its axis"
+)
 THROUGH = "; it goes on through the wall, fixed there, or in bearings and sealed"
 FOLLOWS = "follows from the distance, as the walls end on the part"
 FILLED = "balls go in and out there"
 MOUNTED: dict[Mounting, str] = {
     "part goes in": "the part goes in from outside",
     "wall goes over": "the wall goes over it from outside",
+    "lies on it": "it lies on the wall",
     "split": "split the wall there",
 }
 
@@ -36,12 +42,14 @@ MOUNTED: dict[Mounting, str] = {
 def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     """Yield rows on what holds the part, where it goes out, and what masks it."""
     holder, openings = result.design.holder, built.openings
-    held = CLAMP if result.design.effects.part_turn is None else GUIDED
+    turns = result.design.effects.part_turn is not None
+    held = (DRIVEN if len(openings) < 2 else EITHER) if turns else CLAMP
     if holder is not None and holder.kind == "bore":
         play = "tight"
         if holder.clearance_mm:
             play = f"{plain(holder.clearance_mm)} mm of clearance all round, in the sizes below"
-        by = f"; clamped by {built.clamp.replace(' -', ' −')}" if built.clamp else ""
+        how = "turned" if turns else "clamped"
+        by = f"; {how} by {built.clamp.replace(' -', ' −')}" if built.clamp else ""
         yield "holder", f"the part itself, out through the wall, {play}{by}"
     mask = result.design.mask
     if holder is None and not result.record.chamber.pieces_in_air:
@@ -223,7 +231,8 @@ def _beyond(one: Opening, openings: Sequence[Opening], held: str, mounted: str) 
     if one.beyond < EDGE:
         return f"the part fills it{mounted}"
     farthest = max(other.beyond for other in openings)
-    clamp = f": {held}" if one.beyond >= min(CLAMPED, farthest) else ""
+    is_held = one.beyond >= min(CLAMPED, farthest) and walls_end_at([one]) is None
+    clamp = f": {held}" if is_held else ""
     wider = ""
     if one.wider is not None:
         size = " × ".join(map(_side, one.wider))

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import matters
 from chamberopt.chamber.checks.flat_faces import FlatFace
-from chamberopt.chamber.checks.openings import Opening, part_is_ceiling
+from chamberopt.chamber.checks.openings import Mounting, Opening, part_is_ceiling
 from chamberopt.chamber.checks.strips import StripOfTarget
 from chamberopt.chamber.matters import Urgency
 from chamberopt.cli import main
@@ -604,7 +604,8 @@ def test_a_part_that_lies_on_the_walls_leaves_one_tolerance(folder: Path) -> Non
         ((top, edge), "the part, which lifts off; balls go in and out there"),
         ((top,), "the part, or the ceiling with it, which lifts off; balls go in and out there"),
     ):
-        built = AsBuilt((50.0,), openings)
+        ways: dict[str, Mounting] = {"the ceiling": "part goes in", "the wall": "lies on it"}
+        built = AsBuilt((50.0,), openings, [ways[one.wall] for one in openings])
         tables = [*setting_tables(result, built), *limit_tables(result, openings)]
         rows = {one.caption: dict(one.rows) for one in tables}
         follows = edge in openings
@@ -616,6 +617,11 @@ def test_a_part_that_lies_on_the_walls_leaves_one_tolerance(folder: Path) -> Non
         assert told.startswith("(19.6): follows" if follows else "19.7 to 20.3")
         mount = rows["To peen a part"]["1 mount" if not openings else "2 mount"]
         assert ("it lies on the walls" in mount) == follows
+        cut = [text for one in tables for name, text in one.rows if name == "opening"]
+        assert [text.rpartition("; ")[2] for text in cut if "which ends on the part" in text] == (
+            ["it lies on the wall"] if follows else []
+        )
+        assert not any("split" in text for one in tables for _, text in one.rows)
         assert ("it stands 10 mm out" in mount) == (openings == (top,))
         limits = chamber_limits(result) | reference_limits(result, openings)
         assert with_limits("20", 20.0, limits, "height_mm") == ("(19.6)" if follows else "20 ±0.3")

@@ -81,6 +81,10 @@ def test_a_wall_is_split_only_where_neither_end_passes_its_opening(
     part = SimpleNamespace(vertices=np.array(body.vertices), triangles=np.array(body.faces))
     opening = Opening("the wall", (0.01, 0.01), tuple(place), 0.02, way)
     assert mounting(part, opening, 1e-4) == mounted
+    # A side wall that ends on the part carries it, whatever would pass.
+    assert mounting(part, opening._replace(form="edge"), 1e-4) == "lies on it"
+    ceiling = opening._replace(wall="the ceiling", form="edge")
+    assert mounting(part, ceiling, 1e-4) == mounted
 
 
 def test_a_bar_through_both_side_walls_and_a_post_through_the_ceiling(tmp_path: Path) -> None:

@@ -1,12 +1,24 @@
 """By what an end of a part is gripped: flat faces for jaws, and the thickness of its metal."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
 from manifold3d import Manifold
 
-from chamberopt.chamber.layout.grip import Clamp, _round_end, _round_radius, flat_jaws, thin_grip
+from chamberopt.chamber.checks.openings import find_openings, mounting, walls_end_at
+from chamberopt.chamber.layout.grip import (
+    ON_WALLS,
+    Clamp,
+    _round_end,
+    _round_radius,
+    flat_jaws,
+    outside_clamp,
+    thin_grip,
+)
 from chamberopt.chamber.propose.text import clauses
+from tests.chamberopt.chamber.checks.test_openings import chamber_of
 
 
 @pytest.mark.parametrize(("deep", "is_shallow"), [(2.5, True), (6.0, True), (9.0, False)])
@@ -170,3 +182,20 @@ def test_what_is_as_far_from_an_axis_by_its_edges_alone_is_no_round(
     area, triangles = 1e-6 * mesh.area_faces, np.asarray(mesh.faces)
     found = 1e3 * _round_end(1e-3 * mesh.vertices, triangles, area, [axis])
     assert found == pytest.approx(radius_mm, rel=1e-3)
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_lid_is_pressed_on_its_walls_and_a_shaft_is_turned_by_no_blocks(
+    turns: bool, tmp_path: Path
+) -> None:
+    """A flange that sinks by 0.2 mm into a box 60 mm long, and a shaft through it."""
+    lug = solid(rounded(70, 40, 8, 10, 64).translate([0, 0, 24.8]) + Manifold.cube([8, 8, 25]))
+    lid = chamber_of(tmp_path, lug)
+    ends = [one for one in find_openings(lid) if walls_end_at([one]) is not None]
+    assert {mounting(lid.part, one, 2e-4) for one in ends} == {"lies on it"}
+    assert outside_clamp(lid) == Clamp(ON_WALLS, way=(0.0, 0.0, 1.0))
+    shaft = trimesh.creation.cylinder(5.0, 120.0, sections=64)
+    shaft.apply_transform(trimesh.geometry.align_vectors((0, 0, 1), (1, 0, 0)))
+    text = outside_clamp(chamber_of(tmp_path, shaft), turns).text
+    assert text.endswith("round its diameter of 10 mm")
+    assert ("vee blocks" in text, "chuck" in text) == (not turns, turns)

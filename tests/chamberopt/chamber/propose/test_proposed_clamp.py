@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chamberopt.chamber.layout import grip
 from chamberopt.chamber.layout.end import DEEP
 from chamberopt.chamber.layout.target import Surface
 from chamberopt.chamber.propose import proposed_clamp
@@ -41,7 +42,9 @@ def test_what_is_buried_in_another_body_is_no_jaw(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(
         proposed_clamp, "rows_of", lambda _, keys: np.array(["SHAFT", "KEY"]) == keys["surface"][0]
     )
-    made = SimpleNamespace(design=None, chamber=chamber, known=known)
+    monkeypatch.setattr(grip, "find_openings", lambda _: [])
+    design = SimpleNamespace(effects=SimpleNamespace(part_turn=None))
+    made = SimpleNamespace(design=design, chamber=chamber, known=known)
     assert _clamp(made).text == ("SHAFT (500000 mm² of it), in jaws of that form or potted")  # type: ignore[arg-type]
 
 
