@@ -15,13 +15,21 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.chamber.propose.proposed_budget import COVERED, WIDEST, Measured, TooSlowError
+from chamberopt.chamber.propose.proposal import REPLICAS as FEWEST
+from chamberopt.chamber.propose.proposed_budget import (
+    COVERED,
+    MODEST_GB,
+    WIDEST,
+    Measured,
+    TooSlowError,
+)
 from chamberopt.chamber.replica_seed import step_seed
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import share
 from chamberopt.common.number_text import rounded
 from chamberopt.common.progress import Progress
+from chamberopt.coverage.field.memory import time_within
 from chamberopt.coverage.metrics import NEVER, exposed_target
 from chamberopt.design.intensity import PredictedIntensity, Z
 from chamberopt.design.ranges import variants
@@ -188,7 +196,10 @@ def measure_budget(
     else:
         intensity = PredictedIntensity.of(wide.metrics, design.calibration)
     mean_time = slow.process.treatment_time / mean
+    usual = design.changed({"process.accuracy.gauge_mm2": 1.0})
+    counts = FEWEST, max(FEWEST, design.process.accuracy.max_replicas)
     return Measured(
+        room=min(time_within(1e9 * MODEST_GB, usual, chamber, count) for count in counts),
         dent_rate=dents / (simulated * slow.process.accuracy.gauge),
         collision_rate=collisions / (REPLICAS * time),
         time_to_98=places.value if resolved else mean_time,

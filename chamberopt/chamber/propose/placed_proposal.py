@@ -35,6 +35,7 @@ from chamberopt.chamber.propose.held_proposal import (
 )
 from chamberopt.chamber.propose.proposal import (
     LARGEST_MM,
+    MOST_REPLICAS,
     REPLICAS,
     Proposal,
     Stance,
@@ -71,7 +72,7 @@ ROUNDED = 0.5e-3  # m by which sizes are rounded up
 FEW = 2  # sonotrodes side by side that are better than a room of which the part is held badly
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
-TREATMENT_S, HALF_WIDTH, MOST_REPLICAS = 300.0, 0.03, 24
+TREATMENT_S, HALF_WIDTH = 300.0, 0.03
 FEWER = "so that a strip of it takes few sonotrodes"
 TURNED = "its axis level: about it the part turns, so that all of it passes the shot"
 NO_SPINDLE = "--pose: given turning, but {}; give another pose, or another target (--target)"

@@ -39,7 +39,7 @@ FINE_MM, COARSE_MM = 0.5, 1.0  # steps of lengths
 FEW_MM = 400.0  # longest range with fine steps: a study takes at most 999 steps
 LARGEST_MM = allowed_range(ParametricChamber.model_fields["height_mm"])[1]  # side of a chamber
 HEAVIEST_G = allowed_range(ShotTable.model_fields["mass_g"])[1]
-REPLICAS = 10  # the fewest that a wanted half-width takes
+REPLICAS, MOST_REPLICAS = 10, 24  # the fewest that a wanted half-width takes, and the most
 # Lengths that are set up. In plan the wall follows the sonotrode's face, with less clearance.
 LENGTHS = ("height_mm", "sonotrode_distance_mm")
 PEAK_TO_VALLEY_UM = USUAL["amplitude_pv_um"]

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from chamberopt.chamber.matters import MatterKind
-from chamberopt.chamber.propose.proposal import REPLICAS, Proposal, touched_share
+from chamberopt.chamber.propose.proposal import MOST_REPLICAS, REPLICAS, Proposal, touched_share
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import rounded
 from chamberopt.design.intensity import PredictedIntensity
@@ -27,6 +27,9 @@ COLLISIONS = 2e7
 MINUTES = 6.0
 LEAST_TIME, MOST_TIME = 0.1, 1000.0  # s, of each replica
 LEAST_WARMUP = 0.2  # s: balls cross the chamber some times
+ROUND = (1, 1.5, 2, 3, 5, 7)  # numbers that times and windows are rounded to
+MODEST_GB = 2.0  # that what is proposed takes, with its process, whatever the machine has
+OF_MEMORY = f"{MODEST_GB:g} GB of memory"
 UNSETTLED = "the shot still slowed down at the end of the pilot: results say whether it has settled"
 SLOW_TO_SETTLE = "until then the shot still slowed down, by a pilot"
 USUAL_GAUGE = 1e-6  # m²: wider only where the time would be too long
@@ -68,6 +71,7 @@ class Measured(NamedTuple):
         settled: this is known; otherwise it is half of the pilot.
         intensity: Almen intensity in wide windows, a little more than in single places where these
             differ; None if it is not known.
+        room: simulated time of all replicas that MODEST_GB have room for [s].
     """
 
     dent_rate: float
@@ -83,6 +87,7 @@ class Measured(NamedTuple):
     warmup: float = 0.0
     settled: bool = True
     intensity: PredictedIntensity | None = None
+    room: float = math.inf
 
     @property
     def in_words(self) -> str:
@@ -91,7 +96,7 @@ class Measured(NamedTuple):
 
 
 class Budget(NamedTuple):
-    """Treatment time, simulated time of each replica, and gauge, each with its reason."""
+    """Treatment time, simulated time and number of replicas, and gauge, each with its reason."""
 
     treatment: float  # [s]
     time: float  # [s]
@@ -99,6 +104,7 @@ class Budget(NamedTuple):
     warmup: float  # [s], of each replica
     reasons: dict[str, str]  # by dotted name
     search_time: float  # [s], as in Proposal
+    most_replicas: int = MOST_REPLICAS
 
 
 class Asked(NamedTuple):
@@ -131,6 +137,14 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
     enough = needed / (REPLICAS * found.dent_rate * USUAL_GAUGE)
     most = COLLISIONS / (REPLICAS * found.collision_rate)
     time = _rounded_up(min(max(enough, LEAST_TIME), max(most, LEAST_TIME), MOST_TIME))
+    # More replicas take the memory that fewer, longer ones do.
+    most_replicas = MOST_REPLICAS if MOST_REPLICAS * time <= found.room else REPLICAS
+    is_full = REPLICAS * time > found.room
+    if is_full:
+        time = max(LEAST_TIME, _rounded_down(found.room / REPLICAS))
+    bound = f"{MINUTES:g} minutes of two cores"
+    if is_full:
+        bound = OF_MEMORY
     dents = REPLICAS * found.dent_rate * USUAL_GAUGE * time
     if not is_wish:
         needed = max(for_coverage, min(needed, dents))
@@ -139,11 +153,8 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
     expected = (
         f"about {rounded(dents * gauge, 2)} dents in a window by a pilot; {needed:.0f} would do"
     )
-    few = (
-        f"; {MatterKind.FEW_DENTS} are simulated in {MINUTES:g} minutes of two cores: simulate "
-        "longer"
-    )
-    wider = f"wider than the usual 1 mm²: enough dents within {MINUTES:g} minutes on two cores"
+    few = f"; {MatterKind.FEW_DENTS} are simulated in {bound}: simulate longer"
+    wider = f"wider than the usual 1 mm²: enough dents within {bound}"
     reasons = {
         "process.treatment_time_s": _said_of_treatment(found, treatment, coverage_percent),
         "process.accuracy.simulated_time_s": expected + (few if dents * gauge < needed else ""),
@@ -153,12 +164,16 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
         reasons["process.accuracy.warmup_time_s"] = UNSETTLED
     elif warmup > LEAST_WARMUP:
         reasons["process.accuracy.warmup_time_s"] = SLOW_TO_SETTLE
+    if is_full:
+        reasons["process.accuracy.simulated_time_s"] += f"; no longer, to stay within {OF_MEMORY}"
+    if most_replicas < MOST_REPLICAS:
+        reasons["process.accuracy.max_replicas"] = f"no more, to stay within {OF_MEMORY}"
     if gauge > 1.0:
         reasons["process.accuracy.gauge_mm2"] = wider
     # The time to 98 % takes DENTS alone, where the mean takes more. A slow candidate has fewer.
     least = max(SLOWER * DENTS, strength_dents if in_search else 0.0)
     share = min(1.0, least / (dents * gauge)) if found.places else 1.0
-    return Budget(treatment, time, gauge, warmup, reasons, REPLICAS * time * share)
+    return Budget(treatment, time, gauge, warmup, reasons, REPLICAS * time * share, most_replicas)
 
 
 def measured_budget(made: Proposal, found: Measured) -> Budget:
@@ -184,6 +199,7 @@ def in_turn(budgets: Sequence[Budget]) -> Budget:
         warmup=max(one.warmup for one in budgets),
         reasons=reasons,
         search_time=sum(one.search_time for one in budgets),
+        most_replicas=min(one.most_replicas for one in budgets),
     )
 
 
@@ -194,6 +210,7 @@ def with_budget(made: Proposal, budget: Budget) -> Proposal:
         "process.accuracy.simulated_time_s": budget.time,
         "process.accuracy.gauge_mm2": budget.gauge_mm2,
         "process.accuracy.warmup_time_s": budget.warmup,
+        "process.accuracy.max_replicas": budget.most_replicas,
     }
     tables = {name: dict(table) for name, table in made.tables.items()}
     for name, value in values.items():
@@ -265,9 +282,15 @@ def _said_of_long(found: Measured) -> str:
     return "few balls get to the target, or slowly: a larger sonotrode, harder balls or the study"
 
 
+def _rounded_down(value: float) -> float:
+    """Return the last of 1, 1.5, 2, 3, 5, 7 and their decimal multiples that is no more; or 0."""
+    if value <= 0.0:
+        return 0.0
+    power = 10.0 ** math.floor(math.log10(value) + 1e-9)
+    return float(f"{max(k for k in ROUND if k == 1 or k * power <= value) * power:.3g}")
+
+
 def _rounded_up(value: float) -> float:
     """Return the next of 1, 1.5, 2, 3, 5, 7 and their decimal multiples."""
     power = 10.0 ** math.floor(math.log10(value) + 1e-9)
-    return float(
-        f"{next(k for k in (1, 1.5, 2, 3, 5, 7, 10) if k * power >= value * 0.999) * power:.3g}"
-    )
+    return float(f"{next(k for k in (*ROUND, 10) if k * power >= value * 0.999) * power:.3g}")

@@ -284,7 +284,8 @@ def with_finer_balls(
         weak = after.intensity
         if weak is not None and found.intensity.value < STRONGER * weak.value:
             return None, f"{plain(weak.value, 2)} mmA of {finer_mm:g} mm are hardly less"
-        budgets = [measured_budget(coarse, found), measured_budget(finer, after)]
+        halves = [one._replace(room=0.5 * one.room) for one in (found, after)]
+        budgets = [measured_budget(coarse, halves[0]), measured_budget(finer, halves[1])]
         left_bare = 1.0 - touched_area(coarse) / touched_area(finer)
         is_needed = for_fillets or left_bare > AS_GOOD
         if not is_needed and budgets[1].treatment >= budgets[0].treatment:

@@ -51,6 +51,21 @@ def evaluation_bytes(design: Design, chamber: Chamber, replicas: int) -> float:
     )
 
 
+def time_within(most: float, design: Design, chamber: Chamber, replicas: int) -> float:
+    """Return the simulated time of all replicas [s] whose evaluation takes some bytes, or 0.
+
+    Args:
+        most: these bytes, with those of the process.
+    """
+    one, two = (
+        evaluation_bytes(
+            design.changed({"process.accuracy.simulated_time_s": time}), chamber, replicas
+        )
+        for time in (1.0, 2.0)
+    )
+    return max(0.0, replicas * (most - PROCESS - (2.0 * one - two)) / (two - one))
+
+
 def how_many_fit(most: int, each: float, common: float = 0.0) -> int:
     """Return how many tasks of equal size, from 1 to `most`, may run at once in the allowed memory.
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from chamberopt.chamber.propose.proposal import REPLICAS
+from chamberopt.chamber.propose.proposal import MOST_REPLICAS, REPLICAS
 from chamberopt.chamber.propose.proposed_budget import (
     COLLISIONS,
     DENTS,
@@ -25,6 +25,7 @@ PILOT = Measured(
     simulated=6.4,
     mean_time=200.0,
 )
+MEMORY = "process.accuracy.max_replicas"
 TIME, GAUGE = "process.accuracy.simulated_time_s", "process.accuracy.gauge_mm2"
 
 
@@ -59,6 +60,23 @@ def test_what_does_not_resolve_in_the_time_is_said() -> None:
         "TOO FEW DENTS are simulated in 6 minutes of two cores: simulate longer"
         in budget.reasons[TIME]
     )
+
+
+@pytest.mark.parametrize("room", [1e6, 200.0, 60.0, 17.0, 4.2])
+def test_what_is_simulated_stays_within_a_modest_memory(room: float) -> None:
+    """One replica takes 7 s, so that 24 take 168 s, and 10 take 70 s."""
+    free = propose_budget(PILOT._replace(dent_rate=5e5))
+    budget = propose_budget(PILOT._replace(dent_rate=5e5, room=room))
+    assert free.time == 7.0
+    assert budget.most_replicas * budget.time <= room
+    assert budget.most_replicas == (MOST_REPLICAS if room > 168.0 else REPLICAS)
+    assert (MEMORY in budget.reasons) == (room < 168.0)
+    assert ("stay within 2 GB" in budget.reasons[TIME]) == (room < 70.0)
+    dents = 5e5 * 1e-6 * budget.gauge_mm2 * REPLICAS * budget.time
+    assert dents >= DENTS
+    assert (GAUGE in budget.reasons) == (budget.gauge_mm2 > 1.0)
+    if budget.gauge_mm2 > 1.0:
+        assert budget.reasons[GAUGE].endswith("enough dents within 2 GB of memory")
 
 
 def test_the_treatment_time_is_rounded_up_and_says_what_it_rests_on() -> None:

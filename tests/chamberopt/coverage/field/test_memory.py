@@ -15,7 +15,13 @@ from chamberopt.common import memory
 from chamberopt.common.executor import SerialExecutor
 from chamberopt.common.memory import MEMORY, MemoryBudget
 from chamberopt.coverage.coverage_from_impacts import MAX_BATCHES
-from chamberopt.coverage.field.memory import BATCHES, evaluation_bytes, how_many_fit
+from chamberopt.coverage.field.memory import (
+    BATCHES,
+    PROCESS,
+    evaluation_bytes,
+    how_many_fit,
+    time_within,
+)
 from chamberopt.design.design import Design
 from chamberopt.design.load import save_design
 from chamberopt.search.study import load_study
@@ -53,6 +59,16 @@ def test_what_an_evaluation_takes_is_foretold(points: int, replicas: int, no_roo
     finally:
         tracemalloc.stop()
     assert 0.5 < evaluation_bytes(design, chamber, replicas) / taken < 2.0
+
+
+@pytest.mark.parametrize(("replicas", "most"), [(10, 2e9), (24, 2e9), (24, 9e9), (100, 2e9)])
+def test_the_time_that_a_memory_has_room_for_takes_all_of_it(replicas: int, most: float) -> None:
+    design = design_with(20_000, 8)
+    chamber = build_chamber(design)
+    time = time_within(most, design, chamber, replicas)
+    longest = design.changed({"process.accuracy.simulated_time_s": time / replicas})
+    assert PROCESS + evaluation_bytes(longest, chamber, replicas) == pytest.approx(most)
+    assert time_within(PROCESS, design, chamber, replicas) == 0.0
 
 
 def test_more_of_anything_takes_as_much_more_as_it_is() -> None:
