@@ -142,6 +142,14 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
     alone = setting_tables(bore, AsBuilt((50.0,), openings[:1]))
     (told,) = [text for one in alone for name, text in one.rows if name == "opening"]
     assert told.endswith("clamp it there, so make the wall thin there")
+    # Which end of a part that turns is driven is the shop's choice.
+    turn = {"effects.part_turn": {"rpm": 60.0, "axis": (0.0, 1.0, 0.0)}}
+    turned = replace(bore, design=bore.design.changed(turn))
+    for ends, how in ((1, "drive it there"), (2, "drive it by one such end, the shop's choice")):
+        built = AsBuilt((50.0,), openings[:1] * ends, clamp="a chuck")
+        told = [text for one in setting_tables(turned, built) for _, text in one.rows]
+        assert sum(f"stands out by 9.3 mm: {how}" in text for text in told) == ends
+        assert any(text.endswith("; turned by a chuck") for text in told)
     first = openings[0]
     sides = np.array([[[-0.03, 0.0], [0.03, 0.0]]])
     below = first._replace(place=(0.0, 0.04, 0.1), outline=sides)
