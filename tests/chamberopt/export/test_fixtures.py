@@ -61,8 +61,7 @@ def test_holder_and_mask_are_saved_exported_and_said(tmp_path: Path) -> None:
     content = sheet.sections[0].content
     tables = {one.caption: dict(one.rows) for one in content if getattr(one, "caption", "")}
     assert tables["Chamber"]["holder"] == (
-        "rod Ø 9.6 mm, 17 mm long, from (0, 0, 23) mm along (0, 0, 1) in the chamber's frame, on "
-        "72.3 mm² of the part"
+        "rod Ø 9.6 mm, 17 mm long, from (0, 0, 23) mm along (0, 0, 1), on 72.3 mm² of the part"
     )
     assert tables["Chamber"]["mask"] == "shell 2 mm thick, on 96 mm² of the part"
     assert set(fixture_marks(cavity_surface(kept))) == {"holder", "mask"}
