@@ -571,7 +571,7 @@ def test_shape_and_holder_are_chosen_in_words(opened: Page) -> None:
     assert page.locator("#undo").is_disabled()
 
 
-def test_what_is_settled_is_taken_out_of_the_file(opened: Page) -> None:
+def test_what_is_settled_is_kept_apart_in_the_file(opened: Page) -> None:
     page, file = opened.page, opened.served.folder / "design.toml"
     text = file.read_text()
     many = "MANY BALLS, 5,200, to be dosed and sorted: 2.5 mm would suit 80%"
@@ -589,7 +589,10 @@ def test_what_is_settled_is_taken_out_of_the_file(opened: Page) -> None:
     expect(listed).to_have_count(1, timeout=WAIT)
     expect(listed).to_contain_text("Not masked: ask")
     opened.saved()
-    assert file.read_text() == f'to_settle = [\n  "NOT MASKED: ask",\n]\n{text}'
+    left, _, kept = file.read_text().partition("settled = [\n    ")
+    assert left == 'to_settle = [\n  "NOT MASKED: ask",\n]\n'
+    assert kept.startswith('"MANY BALLS, 5,200, to be dosed and sorted')
+    assert kept.partition(" (marked as settled on ")[2].endswith(f'",\n]\n{text}')
     file.write_text(f'# proposed by `chamberopt new`\nto_settle = ["LONG: ask"]\n{text}')
     page.click("#reload")
     expect(listed).to_contain_text("Long: ask", timeout=WAIT)
