@@ -32,6 +32,7 @@ AREA, OUTLINE = 0.5, 0.5
 # along the longer side is taken.
 AS_GOOD = 0.9
 EVEN = 0.02  # of the width: most distance of a cut's centroid from its middle
+SQUARE = 0.7  # cosine between a wall's normal and an axis, from which on the wall is across it
 SPECK = 1e-3  # share of the cut area below which a piece is none
 
 
@@ -57,8 +58,8 @@ def section_planes(chamber: Chamber) -> list[SectionPlane]:
     through the part's middle, best along the longer side of the chamber. It is taken too where it
     shows most of the part in one piece, or its two sides alike, as of a ring. Planes that miss the
     target are taken only if all do, and then planes off the middle with pieces that seem to float.
-    There is a second one too, through the axis, where no lid is seen in the first, as the part goes
-    out as wide as the room there.
+    There is a second one too, through the axis, where the first does not show how the part goes
+    out: the walls that it goes out through, or a lid, as it is as wide as the room.
     """
     size = np.ptp(chamber.vertices, axis=0)
     longer = int(size[1] > size[0] + 1e-3 * SAME)
@@ -72,16 +73,24 @@ def section_planes(chamber: Chamber) -> list[SectionPlane]:
     top = max(score for _, score in best)
     best.sort(key=lambda one: (one[1] < AS_GOOD * top, not one[0].is_central))
     planes = [one.plane for one, _ in best]
-    if planes[0].span >= ENOUGH and _hides_lid(chamber, planes[0].right):
+    if planes[0].span >= ENOUGH and _hides_way_out(chamber, planes[0].right):
         return [planes[0], every[int(planes[0].right == longer)][0].plane]
     return planes[: 1 if planes[0].span >= ENOUGH else 2]
 
 
-def _hides_lid(chamber: Chamber, right: int) -> bool:
-    """Return whether an opening of the ceiling leaves no lid beside the part along an axis."""
+def _hides_way_out(chamber: Chamber, right: int) -> bool:
+    """Return whether a section along an axis shows no wall that the part goes out through.
+
+    Walls across the section are not in it. Nor is a lid, if an opening of the ceiling leaves none
+    beside the part along the axis.
+    """
     room = float(np.ptp(chamber.vertices[:, right]))
-    openings = [one for one in find_openings(chamber) if one.wall == CEILING]
-    return any(one.size[right] > room - EDGE and one.size[1 - right] > EDGE for one in openings)
+    openings = find_openings(chamber)
+    through = [one for one in openings if one.wall != CEILING and not one.is_end]
+    lids = [one for one in openings if one.wall == CEILING]
+    return any(abs(one.way[1 - right]) > SQUARE for one in through) or any(
+        one.size[right] > room - EDGE and one.size[1 - right] > EDGE for one in lids
+    )
 
 
 class _Cut(NamedTuple):

@@ -14,7 +14,7 @@ from chamberopt.pictures.drawing import section
 from chamberopt.pictures.drawing.arrangement import WALL, arrangement
 from chamberopt.pictures.drawing.centres import Centre, centres, distinct, gaps
 from chamberopt.pictures.drawing.chamber import draw_chamber
-from chamberopt.pictures.drawing.cuts import section_planes
+from chamberopt.pictures.drawing.cuts import _hides_way_out, section_planes
 from chamberopt.pictures.drawing.dimensions import Limits
 from chamberopt.pictures.drawing.section import JAWS
 from chamberopt.pictures.drawing.walls import LID, WALLS
@@ -47,6 +47,19 @@ def texts_of(
             area = 0.5 * sum(float(np.sum(x[:-1] * y[1:] - y[:-1] * x[1:])) for x, y in rings)
             found[one.get_hatch()] = found.get(one.get_hatch(), 0.0) + area
     return [one.get_text() for one in axes.texts], found
+
+
+@pytest.mark.parametrize("along", [0, 1])
+def test_a_section_across_a_bar_hides_the_walls_that_it_goes_out_through(
+    along: int, tmp_path: Path
+) -> None:
+    """A square bar of 12 mm, longer than the room or within it, in a room of 40 x 30 mm."""
+    for length in (60.0, 8.0):
+        sides = np.full(3, 12.0)
+        sides[along] = length
+        bar = room_with(trimesh.creation.box(sides), tmp_path, (0.0, 0.0))
+        assert not _hides_way_out(bar, along)
+        assert _hides_way_out(bar, 1 - along) is (length == 60.0)
 
 
 def test_a_second_section_shows_the_lid_beside_a_part_as_wide_as_the_room(tmp_path: Path) -> None:
