@@ -72,7 +72,6 @@ COLOUR, VIVID = re.compile(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$", re.I), 
 BY_PROGRAM = re.compile(r"(?:created|exported|generated|written)[\s_-]+(?:by|from|with)\b", re.I)
 NUMBERED = re.compile(r"(?:pid|set|zone)[\s_]*\d+$", re.I)  # names that say nothing
 MOST_BESIDE_MM = 2.0  # of what goes on from a fillet, by heart: as wide as its radius below that
-FILLETS = re.compile("fillets of ", re.I)
 FACE = re.compile(r"face (\d+)", re.I)
 FLAT_DEG = 5.0  # largest angle in a face that is flat
 AROUND = 0.1  # share of the fillets' area from which on a face is one in which they lie
@@ -467,9 +466,11 @@ def _joined(chosen: Sequence[Surface], reason: str) -> Target:
     marked = np.any([one.triangles for one in chosen], axis=0)
     if all(one.beside_mm for one in chosen):
         keys["beside_mm"] = beside_mm = max(one.beside_mm for one in chosen)
-        where = "the toes, as wide as the leg of the weld by rule of thumb, as cracks begin there"
-        if FILLETS.match(chosen[0].name):
-            where = "the fillets by rule of thumb, so that it runs out"
+        where = "the fillets by rule of thumb, so that it runs out"
+        if chosen[0].name == BEVELS:
+            where = (
+                "the toes, as wide as the leg of the weld by rule of thumb, as cracks begin there"
+            )
         reason = (
             f"with {beside_mm:g} mm of the faces beside {where} (no source read, "
             f"part.target.beside_mm changes it); {reason}"
