@@ -61,6 +61,7 @@ class DaskExecutor(Executor):
             _require_scheduler(address)
             dask: Any = distributed  # whose functions state no types
             self._client = dask.Client(address, timeout=TIMEOUT_S, set_as_default=False)
+            self._client.futures = _Futures()
         except (OSError, ValueError) as error:
             raise InputError(
                 f"--cluster: no scheduler answers at {address} within {2 * TIMEOUT_S:g} s "
@@ -123,6 +124,18 @@ class DaskExecutor(Executor):
                 )
                 remedy = "figures could differ; install the same there and start it again"
                 raise InputError(f"--cluster: worker {worker} has {different}: {remedy}")
+
+
+class _Futures(dict[str, Any]):
+    """The futures of a Dask client by their names, which one thread reads while another submits.
+
+    Dask cancels the futures of a scheduler that has ended in a loop over `values`. In a plain
+    dict a future that is submitted meanwhile ends that loop with a RuntimeError, before all are
+    cancelled.
+    """
+
+    def values(self) -> Any:
+        return list(super().values())
 
 
 def _scheduler_address(cluster: str) -> str:

@@ -298,6 +298,15 @@ def test_a_scheduler_that_dies_is_one_message(command: str, tmp_path: Path) -> N
     assert "Traceback" not in err
 
 
+def test_a_task_may_be_submitted_while_those_of_a_lost_scheduler_are_cancelled(dask: Dask) -> None:
+    with DaskExecutor(str(dask.scheduler_file)) as executor:
+        submitted = [executor.submit(worker_jobs.square, number) for number in range(3)]
+        states = executor._client.futures.values()
+        for number, _ in enumerate(states):  # as Client._reconnect does it
+            submitted.append(executor.submit(worker_jobs.square, number))
+        assert [future.result() for future in submitted] == [0, 1, 4, 0, 1, 4]
+
+
 def test_tasks_that_the_cluster_cancels_give_the_reason() -> None:
     killed: Future = Future()
     worker = type("Worker", (), {"address": "tcp://10.0.0.7:1"})()
