@@ -266,6 +266,25 @@ class Face(FileTable):
         points, triangles = extrude(self.outline, height)
         return points - [0.0, 0.0, (1.0 + SUNK) * height], triangles
 
+    def joints_on(self, vertices: np.ndarray, floor: np.ndarray) -> np.ndarray:
+        """Return both ends of each joint between blocks on a floor [m], (k, 2, 3).
+
+        Args:
+            vertices: of the chamber [m], (n, 3).
+            floor: triangles of its floor, (m, 3).
+        """
+        from chamberopt.geometry.triangles import border_edges
+
+        start, end = np.moveaxis(vertices[border_edges(floor)], 1, 0)
+        found = []
+        for axis, places in enumerate(self.joints_mm):
+            for at in 1e-3 * np.array(places):
+                meets = (start[:, axis] > at) != (end[:, axis] > at)
+                one, way = start[meets], (end - start)[meets]
+                points = one + way * ((at - one[:, axis]) / way[:, axis])[:, None]
+                found.append(points[points[:, 1 - axis].argsort()].reshape(-1, 2, 3))
+        return np.concatenate(found) if found else np.zeros((0, 2, 3))
+
     @property
     def joints_mm(self) -> tuple[list[float], list[float]]:
         """Places of the joints between columns along x, and between rows along y."""

@@ -29,7 +29,8 @@ from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.number_text import percent, plain
 from chamberopt.design.design import Design
 from chamberopt.design.part import Selection
-from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
+from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL, is_sonotrode
+from chamberopt.design.sonotrode import Face
 from chamberopt.documents.facts import facts_in_words
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.sight import way_to_see
@@ -160,7 +161,7 @@ def shape_answer(design: Design, step: int = 0) -> bytes:
         "zones": [*part.zones],  # zone k + 1 has name k
         "form": _form(design),
     }
-    surface = _surface(shape.vertices, shape.triangles, shape.tags)
+    surface = _surface(shape.vertices, shape.triangles, shape.tags, design.sonotrode.face)
     return packed(head, **surface, **_block(design), state=state, zone=zone)
 
 
@@ -206,7 +207,7 @@ def check_answers(design: Design, step: int = 0) -> Iterator[bytes]:
     state[part.target & (chamber.exposed_area <= 0.0)] = BEYOND
     remeshed = part.file is not None and part.file.original is not None
     own = {"part_points": 1e3 * part.vertices, "part_triangles": part.triangles} if remeshed else {}
-    surface = _surface(chamber.vertices, chamber.triangles, chamber.tags)
+    surface = _surface(chamber.vertices, chamber.triangles, chamber.tags, one.sonotrode.face)
     bodies = _bodies(one, chamber) | _block(one)
     yield packed(head, **{**surface, **bodies}, state=state, **own)
 
@@ -264,15 +265,18 @@ def _state(
 
 
 def _surface(
-    vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray
+    vertices: np.ndarray, triangles: np.ndarray, tags: np.ndarray, face: Face | None
 ) -> dict[str, np.ndarray]:
-    """Return the walls, the sonotrode and the sharp edges of a closed cavity, in mm."""
-    ends, moving = sharp_edges(vertices, triangles), is_sonotrode(tags)
+    """Return the walls and the sonotrode of a closed cavity, and its edges and joints, in mm."""
+    edges, moving = vertices[sharp_edges(vertices, triangles)], is_sonotrode(tags)
+    if face is not None:
+        joints = face.joints_on(vertices, triangles[tags == TAG_SONOTRODE])
+        edges = np.concatenate([edges, joints])
     return {
         "points": 1e3 * vertices,
         "walls": triangles[~moving & (tags != TAG_PART)],
         "sonotrode": triangles[moving],
-        "edges": 1e3 * vertices[ends],
+        "edges": 1e3 * edges,
     }
 
 

@@ -21,12 +21,13 @@ from chamberopt.pictures.charts.colours import (
     zone_colour,
 )
 from chamberopt.pictures.drawn_part import DrawnPart
-from chamberopt.results.vtp_files import Surface, fixture_body, fixture_marks, pyvista
+from chamberopt.results.vtp_files import JOINTS, Surface, fixture_body, fixture_marks, pyvista
 
 DARK, BACKGROUND = "#2b3440", "white"
 FAULT, PALE = "#d01c1c", "#c8b0dc"
 SHARP_EDGE = 30  # degrees between the triangles at an edge that is drawn
 ROUND_STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # of colour bars, times powers of ten
+FROM_OUTSIDE = 0.45  # opacity of a sonotrode that is seen from outside
 LIFT = 0.1  # height of discs over the surface, in radii, so that facets of an edge hide no disc
 DISC_SIDES = 24
 SCATTER = "counted dents scatter: single places look less even than they are"
@@ -122,20 +123,29 @@ def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[An
     """
     tags = np.asarray(chamber["tag"])
     style = {"pickable": False, **NO_RENDER}
-    faces = {}
+    glass, actors, faces = tags == TAG_WALL, [], {}
     for tag in np.unique(tags[is_sonotrode(tags)]):
         face = chamber.extract_cells(tags == tag).extract_surface(algorithm="dataset_surface")
-        faces[int(tag)] = plotter.add_mesh(face, color=SONOTRODE, lighting=False, **style)
-    glass, actors = tags == TAG_WALL, []
+        look = {"color": SONOTRODE, "lighting": False, **style}
+        faces[int(tag)] = plotter.add_mesh(face, culling="front", **look)
+        # Seen from outside, as from below, it does not hide the part.
+        actors.append(plotter.add_mesh(face, culling="back", opacity=FROM_OUTSIDE, **look))
     for name, own in fixture_marks(chamber).items():
         glass &= ~own
         look = {"color": FIXTURE_COLOURS[name], "ambient": 0.45, "diffuse": 0.6, **style}
         actors.append(plotter.add_mesh(fixture_body(chamber, name), **look))
     wall = chamber.extract_cells(glass).extract_surface(algorithm="dataset_surface")
     edges = wall.extract_feature_edges(SHARP_EDGE, non_manifold_edges=False, manifold_edges=False)
+    if JOINTS in chamber.field_data:
+        joints = pyvista().line_segments_from_points(np.asarray(chamber.field_data[JOINTS]))
+        actors.append(plotter.add_mesh(joints, color=DARK, line_width=2, opacity=0.6, **style))
     return faces, [
         *actors,
-        plotter.add_mesh(wall, color=GLASS, opacity=0.16, specular=0.3, **style),
+        *(
+            # The far walls come first: glass hides what is drawn later behind it.
+            plotter.add_mesh(wall, color=GLASS, opacity=0.16, specular=0.3, culling=side, **style)
+            for side in ("front", "back")
+        ),
         plotter.add_mesh(edges, color=DARK, line_width=2, opacity=0.6, **style),
     ]
 

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.layout.target import Surface as Choosable
     from chamberopt.design.load import Design
+    from chamberopt.design.sonotrode import Face
 
 
 PLAIN, MARKED, MISSED, BEYOND, HELD = range(5)
@@ -92,6 +93,7 @@ def draw_target(
         part.target,
         missed=missed,
         chamber=chamber,
+        face=design.sonotrode.face,
         softness=softness_of_part(design, part),
         is_held_outside=design.holder is not None and design.holder.kind == "bore",
         marks=_numbered(design, chamber, known),
@@ -131,6 +133,7 @@ def draw_part(
     edges: np.ndarray | None = None,
     missed: np.ndarray | None = None,
     chamber: Chamber | None = None,
+    face: Face | None = None,
     softness: np.ndarray | None = None,
     is_held_outside: bool = False,
     marks: Sequence[tuple[str, np.ndarray]] = (),
@@ -146,6 +149,7 @@ def draw_part(
         missed: which triangles of the target balls can hardly touch, shape (n,).
         chamber: the chamber, drawn as glass round the part in a further view, with dimensions; if
             it has steps, in a view of each pose.
+        face: on which the chamber stands, whose joints are drawn.
         softness: restitution of the part over that of a rigid one, shape (n,), where it is thin.
             A second row of views shows it on the target.
         is_held_outside: True if the part is clamped where it stands out of the chamber.
@@ -160,7 +164,7 @@ def draw_part(
     marked, missed = (none if chosen is None else chosen for chosen in (marked, missed))
     edges = np.zeros((0, 2, 3)) if edges is None else edges
     job = {"title": title, "corners": corners * MM, "marked": marked & ~missed, "missed": missed,
-           "edges": edges * MM, "chamber": chamber, "softness": softness,
+           "edges": edges * MM, "chamber": chamber, "face": face, "softness": softness,
            "is_held_outside": is_held_outside, "marks": [*marks]}  # fmt: skip
     return draw_in_subprocess(render_part, job, path)
 
@@ -173,7 +177,7 @@ def render_part(job: dict[str, Any]) -> None:
     poses = []
     if job["chamber"] is not None:
         poses = _further_poses(job)
-        job = job | {"chamber": cavity_surface(job["chamber"])}
+        job = job | {"chamber": cavity_surface(job["chamber"], job["face"])}
     kinds = np.select([missed, marked], [MISSED, MARKED], PLAIN)
     part, shown = _coloured(job, kinds)
     legend = [COLOURS[k] for k in np.unique(np.concatenate([kind for _, kind in shown]))]
@@ -203,7 +207,7 @@ def _further_poses(job: dict[str, Any]) -> list[dict[str, Any]]:
         if not any(np.array_equal(vertices, one) for one in seen):
             seen.append(vertices)
             corners = vertices[step.part.triangles] * MM
-            found.append(job | {"chamber": cavity_surface(step), "corners": corners})
+            found.append(job | {"chamber": cavity_surface(step, job["face"]), "corners": corners})
     return found
 
 

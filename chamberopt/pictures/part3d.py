@@ -25,7 +25,7 @@ from chamberopt.pictures.drawn_part import DrawnPart, colour_range, point_areas
 from chamberopt.pictures.quantities import QUANTITIES, TIME_TO_98, times_to_98
 from chamberopt.results.arrays_file import load_result_arrays
 from chamberopt.results.load import Result
-from chamberopt.results.vtp_files import MM, ZONE, Surface, fixture_marks
+from chamberopt.results.vtp_files import JOINTS, MM, ZONE, Surface, cavity_surface, fixture_marks
 
 # A triangle takes about 80 bytes of the page. Up to this number the page stays below 60 MB.
 MAX_TRIANGLES = 600_000
@@ -88,7 +88,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
             "is drawn."
         )
         rest = None
-    chamber = arrays.cavity
+    chamber = cavity_surface(arrays.chamber, result.design.sonotrode.face)
     fitting = arrays.chamber.fitting
     on_deflector = np.zeros(chamber.n_cells, dtype=bool)
     if fitting is not None:
@@ -230,12 +230,13 @@ def _view(chamber: Surface, part: DrawnPart, eye: np.ndarray) -> dict[str, objec
 
 
 def _edges(chamber: Surface, tags: np.ndarray) -> np.ndarray:
-    """Return the end points of the n sharp edges of the cavity, edge after edge, (2 n, 3)."""
+    """Return the end points of the n sharp edges and joints of the cavity, (2 n, 3)."""
     around = chamber.extract_cells(tags != TAG_PART).extract_surface(algorithm="dataset_surface")
     lines = around.extract_feature_edges(
         feature_angle=EDGE_ANGLE, manifold_edges=False, non_manifold_edges=False
     )
-    return np.asarray(lines.points[np.asarray(lines.lines).reshape(-1, 3)[:, 1:]])
+    ends = lines.points[np.asarray(lines.lines).reshape(-1, 3)[:, 1:]].reshape(-1, 3)
+    return np.concatenate([ends, chamber.field_data.get(JOINTS, np.zeros((0, 3)))])
 
 
 def _packed(values: np.ndarray, kind: str = "<f4") -> str:

@@ -14,11 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.files import new_file, write_bytes
+from chamberopt.design.shape_surface import TAG_SONOTRODE
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.part import Part
     from chamberopt.coverage.field.display_mesh import DisplayField
+    from chamberopt.design.sonotrode import Face
 
 PART, COVERAGE, CHAMBER = "part.vtp", "coverage.vtp", "chamber.vtp"
 # Names of cell data in coverage.vtp, and names of the same columns in part.vtp.
@@ -32,6 +34,7 @@ OF_ELEMENT = {
 ZONE = "zone"  # a column of both files, in results with zones
 FIXTURES = {"holder": 1, "mask": 2}  # numbers of the cell data "fixture" in chamber.vtp
 FIXTURE_BODY = "{}_points", "{}_triangles"  # field data of chamber.vtp: their closed surfaces
+JOINTS = "joints"  # field data of a cavity to draw
 MM = 1e3
 # VTK's writer of .vtkhdf gives each column of numbers room for 25,000 at least, of 8 bytes. The
 # mesh takes as much as 11 columns.
@@ -77,7 +80,7 @@ def field_surface(display: DisplayField, values: dict[str, np.ndarray]) -> Surfa
     return surface
 
 
-def cavity_surface(chamber: Chamber) -> Surface:
+def cavity_surface(chamber: Chamber, face: Face | None = None) -> Surface:
     """Return the closed cavity [mm] with these values for each triangle.
 
     tag: surface to which it belongs: 0 part, 1 sonotrode, 2 wall, 3 and more further sonotrodes.
@@ -87,7 +90,7 @@ def cavity_surface(chamber: Chamber) -> Surface:
     fixture: 1 on the holder, 2 on the mask, 0 elsewhere. Only chambers with either have this value.
 
     The closed surfaces of holder and mask, which also lie on walls and part, are its field data, as
-    points [mm] and triangles.
+    points [mm] and triangles. So are the ends of the joints between the blocks of a face [mm].
     """
     fields = {"tag": chamber.tags, "source": chamber.source}
     if chamber.fitting is not None:
@@ -100,6 +103,10 @@ def cavity_surface(chamber: Chamber) -> Surface:
         points, triangles = (key.format(name) for key in FIXTURE_BODY)
         surface.field_data[points] = one.vertices * MM
         surface.field_data[triangles] = one.triangles
+    if face is not None and face.count > 1:
+        floor = chamber.triangles[chamber.tags == TAG_SONOTRODE]
+        ends = face.joints_on(chamber.vertices, floor).reshape(-1, 3)
+        surface.field_data[JOINTS] = ends * MM
     return surface
 
 

@@ -114,14 +114,9 @@ def draw_face(axes: Axes, chamber: Chamber, view: View, face: Face) -> tuple[lis
     floor = chamber.triangles[chamber.tags == TAG_SONOTRODE]
     area = outline_path(inside(1e3 * chamber.vertices[border_edges(floor)][:, :, :2]))
     assert area is not None
-    in_view = type(area)(view.place(area.vertices), area.codes)
     look: dict[str, Any] = {"ls": (0, (6, 2)), "lw": 0.8}
-    for axis, places in enumerate(face.joints_mm):
-        for at in places:
-            ends = np.array([view.low, view.high])
-            ends[:, axis] = at
-            (line,) = axes.plot(*view.place(ends).T, color=SONOTRODE, **look)
-            line.set_clip_path(in_view, axes.transData)
+    for ends in 1e3 * face.joints_on(chamber.vertices, floor)[:, :, :2]:
+        axes.plot(*view.place(ends).T, color=SONOTRODE, **look)
     found = ["the joints of the floor's blocks"] if face.count > 1 else []
     if not (np.array(face.sides_mm) > np.ptp(area.vertices, axis=0) + WIDER).any():
         return found, ""

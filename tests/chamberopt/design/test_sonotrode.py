@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import amplitude_notes, warnings
@@ -9,6 +10,7 @@ from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.scene import build_scene, chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import load_design, save_design
+from chamberopt.design.sonotrode import Face
 from sim_core import Vibration
 from sim_core.effects.amplitude_profile import shares_at
 from tests.helpers.synthetic import plate_design
@@ -145,6 +147,24 @@ def test_a_floor_of_blocks_is_simulated_as_one_face(rigid, mesh) -> None:
         build_chamber(disc.changed({"sonotrode.face.diameter_mm": width - 0.01}))
     with pytest.raises(InputError, match="each of which has its own: not supported"):
         bent(made)
+
+
+def test_joints_of_blocks_end_where_the_floor_does() -> None:
+    """On a disc each is a chord, on a ring two, and past its rim there is none."""
+    face = Face(size_mm=(20.0, 30.0), columns=3, rows=2)
+    disc = trimesh.creation.cylinder(radius=0.02, height=0.01, sections=4096)
+    floor = disc.faces[(disc.triangles_center[:, 2] < -4.999e-3)]
+    points, half = np.asarray(disc.vertices), 1e3 * np.sqrt(0.02**2 - 0.01**2)
+    chords = [[[x, -half], [x, half]] for x in (-10.0, 10.0)] + [[[-20.0, 0.0], [20.0, 0.0]]]
+    found = 1e3 * face.joints_on(points, floor)
+    np.testing.assert_allclose(found[:, :, :2], chords, atol=1e-3)
+    ring = trimesh.creation.annulus(r_min=0.008, r_max=0.02, height=0.01, sections=4096)
+    floor = ring.faces[ring.triangles_center[:, 2] < -4.999e-3]
+    (left, right) = 1e3 * Face(size_mm=(40.0, 30.0), rows=2).joints_on(ring.vertices, floor)
+    np.testing.assert_allclose([left[:, 0], right[:, 0]], [[-20, -8], [8, 20]], atol=1e-3)
+    far = ring.vertices + np.array([0.05, 0.0, 0.0])
+    wide = Face(size_mm=(60.0, 60.0), columns=2).joints_on(far, floor)
+    assert wide.shape == (0, 2, 3)
 
 
 def test_shares_are_measured_up_to_the_distance_that_the_message_allows(rigid) -> None:

@@ -70,7 +70,7 @@ def test_each_pose_of_a_part_has_a_view_in_the_chamber(tmp_path: Path) -> None:
     ]
     design = load_design("designs/plate.toml").changed({"steps": poses})
     chamber = build_chamber(design)
-    (other,) = _further_poses({"chamber": chamber})
+    (other,) = _further_poses({"chamber": chamber, "face": None})
     corners = MM * chamber.part.vertices[chamber.part.triangles]
     turned = np.stack([-corners[..., 1], corners[..., 0], corners[..., 2]], axis=2)
     np.testing.assert_allclose(other["corners"], turned, atol=1e-9)
