@@ -41,7 +41,9 @@ export function drawDimensions(view, { shape, shape_mm: [low, high], part_mm: [a
     view.lines(`${name}, lines`, Float32Array.from(lines.flat()), along ? "#56616a" : "#b4bcc2", along ? "wall" : "", along);
     view.texts(name, texts, along ? "wall" : "", along);
   };
-  show("box", ends, [["part " + b.map((x, i) => short(x - a[i])).join(" × ") + " mm", [0.5 * (a[0] + b[0]), a[1], b[2] + 0.03 * size]]]);
+  // So high that it is over the part's farther edge too, as seen from 20 degrees above.
+  const above = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), b[2] + 0.04 * size + 0.3 * Math.min(b[0] - a[0], b[1] - a[1])];
+  show("box", ends, [["part " + b.map((x, i) => short(x - a[i])).join(" × ") + " mm", above]]);
   const across = high[1] - low[1], isRound = shape !== "box" && Math.abs(high[0] - low[0] - across) < 1e-3 * size;
   const sign = shape === "cylinder" ? "⌀ " : "";
   show("width", dimension([low[0], low[1], 0], [high[0], low[1], 0], [0, -gap, 0], size),
@@ -51,9 +53,10 @@ export function drawDimensions(view, { shape, shape_mm: [low, high], part_mm: [a
   // What of the part is outside of the walls may be lower: then the distance is at an edge of the chamber.
   const set = Number(distance_mm ?? a[2]), isOwn = Math.abs(set - a[2]) < 0.05;
   const [x, y] = isOwn ? [b[0], a[1]] : [low[0], low[1]];
-  show("height", [...dimension([high[0], high[1], 0], [high[0], high[1], high[2]], [gap, 0, 0], size),
+  const side = isRound ? 0.5 * (low[1] + high[1]) : high[1];
+  show("height", [...dimension([high[0], side, 0], [high[0], side, high[2]], [gap, 0, 0], size),
     ...dimension([x, y, 0], [x, y, set], [0, 0, 0], size)],
-  [[`height ${short(high[2])} mm`, [high[0] + gap, high[1], 0.8 * high[2]]], [`distance ${short(set)} mm`, [x, y, 0.5 * set]]]);
+  [[`height ${short(high[2])} mm`, [high[0] + gap, side, 0.8 * high[2]]], [`distance ${short(set)} mm`, [x, y, 0.5 * set]]]);
 }
 
 // Ends of the lines of a dimension between two places: arrows, aside by a way, and a line from each place to its arrow.
