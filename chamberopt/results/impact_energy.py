@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 BLOCKS = 10  # pieces of the recorded time, whose scatter gives the intervals
 PART, BALLS = "the part", "ball on ball"
 FACE_BINS, ANGLES, HEIGHTS = 24, 36, 12  # bins of the maps
+LEAST = 0.25  # share of the largest bin: of less surface, single impacts would be a figure
 SAMPLES = 200_000  # points on all surfaces, and some more, from which the areas of bins are found
 
 
@@ -56,7 +57,7 @@ class SurfaceEnergy(NamedTuple):
 
 
 class EnergyMap(NamedTuple):
-    """Power of impacts over area [W/m²] in bins (columns, rows); nan where there is no surface.
+    """Power of impacts over area [W/m²] in bins (columns, rows); nan where there is little surface.
 
     across, up: edges of the bins [m], or degrees across a wall that is unrolled.
     """
@@ -200,7 +201,7 @@ def _maps(
         area = np.histogramdd(places, bins=edges, weights=stands_for[on])[0]
         energy = np.histogramdd(hits, bins=edges, weights=power[hit])[0]
         with np.errstate(invalid="ignore", divide="ignore"):
-            density = np.where(area > 0.0, energy / area, np.nan)
+            density = np.where(area > LEAST * area.max(), energy / area, np.nan)
         found.append(EnergyMap(title, edges[0], edges[1], density, unrolled))
     return tuple(found)
 
