@@ -70,7 +70,7 @@ def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
     of several parameters multiply. The simulated time of a replica is the time with the cheapest
     total.
     """
-    settings, remarks = dict(study.settings), []
+    settings, remarks, unsure = dict(study.settings), list[str](), list[str]()
     reference = study.reference.cpu.value
     factor, warm_up_saving = 1.0, 0.0
     for name in settings:
@@ -87,8 +87,10 @@ def recommend(study: ConvergenceStudy, accuracy: float) -> Recommendation:
             else:
                 factor *= best.cpu.value / reference
         elif not all(run.is_biased for run in cheaper):
-            text = "cheaper settings may do, but their bias is not known well enough"
-            remarks.append(f"{name}: {text}; raise --budget-s")
+            unsure.append(name)
+    if unsure:
+        text = "cheaper settings may do, but their bias is not known well enough"
+        remarks.append(f"{', '.join(unsure)}: {text}; raise --budget-s")
     options = []
     for run in (study.reference, *study.runs):
         if run.parameter in (REFERENCE, TIME):

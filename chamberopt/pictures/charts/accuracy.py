@@ -41,8 +41,14 @@ def _draw_errors(axes: Axes, study: ConvergenceStudy) -> None:
     settings, and the recommended settings. A bias is drawn at the cost of as many replicas as the
     design has.
     """
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
     axes.set_xscale("log")
     axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
     for accuracy in ACCURACIES:
         axes.axhline(accuracy, color=GREY, lw=0.8, ls=":")
     sizes, law = study.sizes, study.law

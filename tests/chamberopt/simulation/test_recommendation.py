@@ -100,6 +100,7 @@ def test_cheapest_setting_within_a_third_of_the_accuracy_is_taken() -> None:
     assert usual.settings[ELASTIC_SPEED] == 1.0  # a coarser one saves no more than chance
     assert usual.settings[WARM_UP] == 0.8  # its bias is not known to 0.0033
     assert any(WARM_UP in text and "not known well enough" in text for text in usual.remarks)
+    assert tight.remarks[0].startswith(f"{FACETS}, {WARM_UP}: cheaper settings may do")
     # More recorded time shares the cost of start and warm-up.
     assert tight.settings[TIME] == 6.0
     seconds = tight.settings[TIME] + tight.settings[WARM_UP]
