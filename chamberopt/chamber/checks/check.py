@@ -26,14 +26,16 @@ from chamberopt.chamber.checks.gaps import (
     pocket_warnings,
     surface_warnings,
 )
-from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, mm2, surface_names
+from chamberopt.chamber.checks.openings import find_walls_in_holes
+from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, around, mm2, surface_names
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.dimensionless import free_path
+from chamberopt.chamber.matters import MatterKind, matter_of
 from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.reach import Reach, find_reach, reached_part_share
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import one_line
-from chamberopt.common.number_text import plain
+from chamberopt.common.number_text import counted, plain
 from chamberopt.design.almen_strip import USUAL_K_LOG_SD
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE
 from chamberopt.geometry.triangles import areas, edge_keys, sides_of, unit_normals
@@ -53,6 +55,7 @@ MIN_AMPLITUDES = 10.0  # between part and sonotrode, as for sonotrode_distance_m
 MAX_HIDDEN_SHARE = 0.05  # of the target's area; a larger share means a misplaced ceiling or wall
 DOWN = 0.9  # cosine to the way down from which on a face that was level looks at the sonotrode
 MIN_MASKED = 1e-4  # share of the target under a mask that is worth a warning
+MOST_HOLES = 3  # of the part through a wall, which a warning names
 MIN_FREE_PATH = 10.0  # chamber heights; on longer paths few balls meet another ball before a dent
 
 
@@ -193,6 +196,7 @@ def first_warnings(
             found.append(DesignWarning(WarningKind.HIDDEN, text, (name,)))
     found += _mask_warnings(chamber)
     found += _side_wall_warnings(design, chamber)
+    found += _hole_warnings(design, chamber)
     found += [
         DesignWarning(WarningKind.REST, one.message, (one.name,))
         for one in find_ledges(design, chamber, turned_down)
@@ -334,6 +338,31 @@ def _side_wall_warnings(design: Design, chamber: Chamber) -> list[DesignWarning]
         f"{named}, or check part.offset_mm"
     )
     return [DesignWarning(WarningKind.SIDE_WALL, text)]
+
+
+def _hole_warnings(design: Design, chamber: Chamber) -> list[DesignWarning]:
+    """Return a warning if pieces of a wall stand by themselves in holes of the part, else [].
+
+    A proposal that leaves holes open tells of them among what is to be settled.
+    """
+    found = find_walls_in_holes(chamber)
+    told = {MatterKind.HOLE, MatterKind.HOLES}
+    if not found or any(matter_of(one).kind in told for one in design.to_settle):
+        return []
+    where = [
+        f"of {one.size_in_words} in {one.opening.wall} at {around(np.array([one.opening.place]))}"
+        for one in found
+    ]
+    more = f" and {len(where) - MOST_HOLES} more" if len(where) > MOST_HOLES else ""
+    key = design.chamber.ceiling_key
+    moved = any(one.opening.wall == CEILING for one in found) and key != "shape"
+    text = (
+        f"the wall goes across {counted(len(where), 'hole')} of the part, "
+        f"{', '.join(where[:MOST_HOLES])}{more}: the piece of wall in a hole is held by nothing, "
+        "and balls leave there; plug it (mask.plugs = true, with the hole's wall as mask.at), or "
+        f"{f'change chamber.{key}' if moved else 'move the part'}"
+    )
+    return [DesignWarning(WarningKind.WALL_IN_HOLE, text, (found[0].opening.wall,))]
 
 
 def _sonotrode_warnings(

@@ -43,6 +43,8 @@ FACETED = 0.98  # least distance of a side's middle from that of a circle over t
 AT_EDGE = 1e-5  # m: a line this near to the edge of a wall lies on it
 PLATE = 0.01  # m outside a wall's inner face, in which the wall is, however thick
 
+# Largest difference of a hole's sides over the longer one, with which it is called round.
+ROUND_HOLE = 0.05
 # m: of a wall between two openings, below which it does not stand, by rule of thumb; and between
 # points along their sides, by which it is measured.
 LEAST_RIB, RIM_STEP = 2e-3, 2.5e-4
@@ -157,6 +159,13 @@ class WallInHole(NamedTuple):
 
     opening: Opening  # its place and size, like those of an opening
     beside: np.ndarray  # numbers of the part's triangles that it meets
+
+    @property
+    def size_in_words(self) -> str:
+        """The hole's size in the wall, such as "12 mm" of a round one."""
+        wide, narrow = sorted((1e3 * one for one in self.opening.size), reverse=True)
+        is_round = wide - narrow <= ROUND_HOLE * wide
+        return f"{wide:.3g} mm" if is_round else f"{wide:.3g} x {narrow:.3g} mm"
 
 
 def find_walls_in_holes(chamber: Chamber) -> list[WallInHole]:

@@ -23,6 +23,7 @@ class WarningKind(StrEnum):
     UNTOUCHED = auto()  # some of the target or a zone is touched by no ball
     MASK = auto()  # covers some of the target
     SIDE_WALL = auto()  # the part goes out through it
+    WALL_IN_HOLE = auto()  # a piece of it would stand by itself in a hole of the part
     COLLISIONS = auto()  # of balls are left out, though there would be many
     PART_TURN = auto()  # takes longer than what is simulated
     CHARGE = auto()  # its mass is rounded to whole balls

@@ -46,8 +46,14 @@ PEAK_TO_VALLEY_UM = USUAL["amplitude_pv_um"]
 OF_AMPLITUDE = {"amplitude_um": 0.5 * PEAK_TO_VALLEY_UM, "amplitude_pv_um": PEAK_TO_VALLEY_UM}
 OF_LENGTHS = "heights: ISO 2768-m; amplitude: SAE AMS 2580A; what they cost: simulate --tolerances"
 # Warnings of fillets, slots and gaps that are too narrow, and of what no ball touches, which counts
-# in what balls serve; and of gaps that jam balls, which are counted.
-COUNTED = UNPEENED | {WarningKind.FILLET, WarningKind.SLOT, WarningKind.NARROW_GAP, WarningKind.JAM}
+# in what balls serve; of gaps that jam balls, which are counted; and of holes to be plugged later.
+COUNTED = UNPEENED | {
+    WarningKind.FILLET,
+    WarningKind.SLOT,
+    WarningKind.NARROW_GAP,
+    WarningKind.JAM,
+    WarningKind.WALL_IN_HOLE,
+}
 Tables = dict[str, dict[str, Any]]
 """Tables of a design file by dotted name, as TOML values."""
 

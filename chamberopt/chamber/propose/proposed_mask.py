@@ -65,8 +65,6 @@ EDGES = (
     "peened, as dents roll a burr over them, or guard those that are thin (no source read)"
 )
 ONE_SIDED = 0.25  # share of the target over thin metal with a bare far side, which is told
-# Largest difference of a hole's sides over the longer one, with which it is called round.
-ROUND_HOLE = 0.05
 OTHER_HOLES = "the wall crosses other holes of the part, which need plugs"
 MOVED_MM = 0.3  # of an opening, which is milled round the part with less play
 # Names of what fits to other parts, whose size and finish shot would change.
@@ -128,12 +126,8 @@ def open_holes(proposal: Proposal) -> str:
         told = np.zeros(len(room.part.triangles), dtype=bool)
         for hole in find_walls_in_holes(room):
             told[hole.beside] = True
-            opening = hole.opening
-            wide, narrow = sorted((1e3 * one for one in opening.size), reverse=True)
-            size = f"{wide:.3g} mm"
-            if wide - narrow > ROUND_HOLE * wide:
-                size = f"{wide:.3g} x {narrow:.3g} mm"
-            words.append((size, opening.wall, around(np.array([opening.place]))))
+            place = around(np.array([hole.opening.place]))
+            words.append((hole.size_in_words, hole.opening.wall, place))
         at_wall = part_at_wall(room)
         if not at_wall.any():
             continue

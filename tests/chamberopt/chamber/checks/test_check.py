@@ -18,13 +18,14 @@ from chamberopt.chamber.checks.facts import describe
 from chamberopt.chamber.checks.gaps import find_ledges, gutter_warnings, surface_warnings
 from chamberopt.chamber.checks.place_names import CEILING, PART, PART_SIDE, SIDE_WALL, UPPER_SIDE
 from chamberopt.chamber.checks.warning import WarningKind
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.reach import find_reach
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.design.design import Design, validate
 from chamberopt.design.load import load_design
 from chamberopt.design.shapes import TAG_SONOTRODE
 from sim_core import SceneError
-from tests.chamberopt.chamber.checks.test_openings import chamber_of
+from tests.chamberopt.chamber.checks.test_openings import chamber_of, design_of
 
 DESIGNS = Path(__file__).resolve().parents[4] / "designs"
 
@@ -299,3 +300,19 @@ def test_it_is_said_whether_gaps_or_corners_keep_balls_out(
     chamber = chamber_of(tmp_path, body, target=inside)
     (one,) = surface_warnings(find_reach(chamber_mesh(chamber), 2.5e-3), chamber)
     assert f"most of it in {what}" in one.text
+
+
+def test_a_piece_of_the_ceiling_in_a_bore_of_the_part_is_warned_of(tmp_path: Path) -> None:
+    """The ceiling at z = 40 mm crosses a tube; below a higher one the whole tube hangs."""
+    tube = trimesh.creation.annulus(6.0, 8.0, 60.0, sections=64)
+    design = design_of(tmp_path, tube)
+    (said,) = texts_of(WarningKind.WALL_IN_HOLE, design, build_chamber(design))
+    assert said.startswith(
+        "the wall goes across 1 hole of the part, of 12 mm in the ceiling at (0.0, 0.0, 40.0) mm:"
+    )
+    assert "plug it (mask.plugs = true" in said
+    assert said.endswith("or change chamber.height_mm")
+    higher = design.changed({"chamber.height_mm": 80.0})
+    assert not texts_of(WarningKind.WALL_IN_HOLE, higher, build_chamber(higher))
+    told = design.model_copy(update={"to_settle": (f"{MatterKind.HOLE}, not plugged",)})
+    assert not texts_of(WarningKind.WALL_IN_HOLE, told, build_chamber(told))
