@@ -7,7 +7,13 @@ from typing import Any
 import pytest
 
 from chamberopt.common.estimate import Estimate
-from chamberopt.documents.answer import _ended_lines, answer, answer_lines, on_average
+from chamberopt.documents.answer import (
+    _ended_lines,
+    _unresolved_lines,
+    answer,
+    answer_lines,
+    on_average,
+)
 from chamberopt.documents.coverage import figures, main_figures
 from chamberopt.documents.study import influence_sentences, influences, tried_sentence
 from chamberopt.documents.wording import Label, objective_label
@@ -214,6 +220,19 @@ def test_what_is_not_resolved_is_not_in_the_answer_as_a_number(reach: float, onl
     )
     assert "its mean coverage is not resolved" in on_average(result)
     assert answer(result, result).startswith("Too few dents were simulated to tell wheth")
+
+
+def test_a_time_that_is_not_resolved_is_warned_of() -> None:
+    design = SimpleNamespace(process=SimpleNamespace(treatment_time=120.0))
+
+    def warned(time: Estimate) -> list[tuple[str, bool]]:
+        result: Any = SimpleNamespace(design=design, metrics={"time_to_98_s": time})
+        return [(one.text, one.warns) for one in _unresolved_lines(result)]
+
+    few = "So few dents do not tell whether 120 s are enough: simulate longer."
+    assert warned(Estimate(100.0, 10.0).not_known("not resolved")) == [(few, True)]
+    assert not warned(Estimate(100.0, 10.0))
+    assert not warned(Estimate(1e6, 0.0, in_words="never"))  # which time_lines tells
 
 
 def test_a_mean_that_is_but_bounded_is_told_by_the_least_covered_places() -> None:
