@@ -28,7 +28,7 @@ TITLE, NUMBERS = 0.72, 0.27  # shares of a view's width, for its title and a tri
 EDGE = 10  # pixels between text and the edge of the view
 MARK = "#d6006c"  # colour of the chosen triangle, which no colour map has
 BINS = 20
-NUMBER = re.compile(r"\S+ \S+ ± \S+( %)?")
+NUMBER = re.compile(r"\S+ \S+ ± \S+( %)?|\d\S* mm²")
 
 Size = tuple[int, int]
 """Width and height of a view [pixels]."""
