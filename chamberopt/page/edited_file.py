@@ -390,6 +390,11 @@ def _table(value: dict[str, object]) -> object:
 # Fields of the page: each number and choice of a design with unit, bounds and description.
 
 SHARE = "_share"  # end of the name of a share
+# Numbers for which the page offers that a study varies them; a study file may vary others too.
+DESIGNED = re.compile(
+    r"(steps\.\d+\.)?(chamber|sonotrode|shot|holder|mask|effects\.part_turn|part\.rotate_deg"
+    r"|part\.offset_mm)\.|(steps\.\d+\.)?(process\.treatment_time_s|time_share)$"
+)
 # Tables without fields: their numbers are measured, or chosen by clicks on the part, or mesh the
 # part, which would become another part.
 NOT_SHOWN = (
@@ -406,7 +411,7 @@ def design_fields(file: EditedFile) -> list[dict[str, object]]:
     Each row has the name, also in words, value, unit, allowed range and explanation, and the reason
     that the file has behind it.
     """
-    design, varied = file.design, set(file.design.numbers())
+    design, varied = file.design, {*filter(_is_designed, file.design.numbers())}
     reasons = comments(file.text)
     rows: list[dict[str, Any]] = []
     named = [
@@ -447,6 +452,14 @@ def design_fields(file: EditedFile) -> list[dict[str, object]]:
         | {"reason": on_page(_new(row["reason"], row["text"])), "text": on_page(row["text"])}
         for row in [*_structure_rows(file), *sorted(rows, key=lambda row: row["name"] == FACETS)]
     ]
+
+
+def _is_designed(name: str) -> bool:
+    """Return whether a number is one of process or geometry, which a designer may choose.
+
+    Metals are what they are, and settings of the simulation say how sure its figures are.
+    """
+    return bool(DESIGNED.match(name)) and name != "shot.density_kg_m3"
 
 
 def _new(reason: str, text: str) -> str:

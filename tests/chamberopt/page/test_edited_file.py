@@ -187,6 +187,16 @@ def test_every_number_has_its_bounds_unit_and_description(file: EditedFile) -> N
             assert name in rows
 
 
+def test_a_study_of_the_page_varies_process_and_geometry(file: EditedFile) -> None:
+    rows = design_fields(file)
+    varied = {str(row["name"]) for row in rows if row.get("varies")}
+    assert {"chamber.height_mm", "part.rotate_deg.2", "part.offset_mm.0"} < varied
+    assert {"shot.diameter_mm", "shot.mass_g", "sonotrode.amplitude_um"} < varied
+    assert "process.treatment_time_s" in varied
+    others = ("process.accuracy", "materials", "effects.friction", "part.smoothing", "shot.density")
+    assert not [name for name in varied if name.startswith(others)]
+
+
 def test_how_the_file_says_it_is_kept_or_refused_in_words(file: EditedFile) -> None:
     """Dotted keys, inline tables and lists of them are TOML too."""
     text = file.path.read_text()
