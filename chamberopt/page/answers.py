@@ -15,6 +15,7 @@ from chamberopt.chamber.bores_and_deflectors import on_deflectors
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import first_warnings, notes, shot_reach
 from chamberopt.chamber.checks.facts import describe, first_facts, with_clearance
+from chamberopt.chamber.checks.openings import find_openings
 from chamberopt.chamber.checks.warning import UNPEENED, DesignWarning, WarningKind
 from chamberopt.chamber.layout.target import (
     Surface,
@@ -199,6 +200,7 @@ def check_answers(design: Design, step: int = 0) -> Iterator[bytes]:
     head: dict[str, Any] = {
         "facts": _facts(design, with_clearance(first_facts(design, whole), mesh)),
         "notes": [on_page(text) for text in notes(design, whole)],
+        "openings": _openings(chamber),
         **_warnings(first_warnings(design, whole, mesh)),
     }
     part = chamber.part
@@ -221,6 +223,16 @@ def check_answers(design: Design, step: int = 0) -> Iterator[bytes]:
         **_warnings(found["warnings"]),
     }
     yield packed(head, state=state)
+
+
+def _openings(chamber: Chamber) -> list[tuple[str, str]]:
+    """Return the wall and the size of each opening through which the part goes out, in words."""
+    found = []
+    for one in find_openings(chamber):
+        wide, high = (plain(round(1e3 * side, 1)) for side in one.size)
+        size = f"Ø {wide} mm" if one.form == "round" else f"{wide} × {high} mm"
+        found.append((one.wall, "where it ends on the part" if one.is_end else size))
+    return found
 
 
 def _warnings(found: Sequence[DesignWarning]) -> dict[str, list[Words]]:

@@ -92,6 +92,7 @@ function followCavity() {
       const cavity = unpack(buffer, 4);
       showCavity(cavity);
       sayOf(cavity);
+      sayEffect(cavity.openings);
       document.body.dataset.checked = "cavity";
       busy("finding what the balls reach …");
       const reach = unpack(await ask("/reach", { number: new DataView(buffer).getUint32(0, true) }));
@@ -107,6 +108,21 @@ function followCavity() {
       else refuse(error);
     }
   }, QUIET);
+}
+
+// What a change did to the ways out of the chamber besides, against the design as its file has it.
+const inFile = new Map(); // openings of each step: wall and size
+function sayEffect(openings) {
+  if (!Object.keys(state.shown).length) inFile.set(state.step, openings);
+  const before = inFile.get(state.step) ?? openings, sizes = (list, wall) => list.filter(([one]) => one === wall).map(([, size]) => size).join(" and ");
+  const told = [...new Set([...openings, ...before].map(([wall]) => wall))].map((wall) => {
+    const now = sizes(openings, wall), was = sizes(before, wall);
+    if (now === was) return "";
+    if (!was) return `the part now goes out through ${wall}, by an opening of ${now}`;
+    return now ? `the opening in ${wall} is now ${now}; in the file it is ${was}` : `the part no longer goes out through ${wall}`;
+  }).filter(Boolean);
+  find("effect").textContent = told.length ? `With these values ${told.join("; ")}.` : "";
+  find("effect").hidden = !told.length;
 }
 
 function busy(text) { find("busy").textContent = text; }
@@ -158,6 +174,7 @@ listen((what) => {
     find("file").title = `${state.file.file} in ${state.file.folder}`;
     document.title = `${state.file.file}: chamberopt`;
     shownOf = structure();
+    inFile.clear();
     makeFields();
     fillTarget();
     fillRun();

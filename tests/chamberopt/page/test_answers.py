@@ -86,6 +86,15 @@ def test_what_is_outside_the_chamber_stands_before_other_warnings(tmp_path: Path
         assert all(one not in head["warnings"] for one in head["unpeened"])
 
 
+def test_the_openings_of_a_chamber_are_told(tmp_path: Path) -> None:
+    """The box of 10 x 20 x 30 mm hangs 15 mm over the sonotrode, so that its top is at 45 mm."""
+    design = design_of(tmp_path, {})
+    for height, told in ((60.0, []), (40.0, [["the ceiling", "10 × 20 mm"]])):
+        answer = next(iter(check_answers(design.changed({"chamber.height_mm": height}))))
+        head = json.loads(answer[4 : 4 + int.from_bytes(answer[:4], "little")])
+        assert head["openings"] == told
+
+
 @pytest.mark.parametrize("text", ["", "a", "ab", "abc"])
 def test_packed_arrays_begin_at_words_and_are_read_as_the_page_does(text: str) -> None:
     given = {

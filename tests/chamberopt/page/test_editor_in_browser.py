@@ -69,6 +69,20 @@ def test_a_number_changes_the_shape_the_facts_and_one_line(opened: Page) -> None
     assert said == [one.text for one in told]
 
 
+def test_a_change_that_opens_the_ceiling_says_so(opened: Page) -> None:
+    """The box of 16 mm, whose top is at 28 mm, goes out through a ceiling at 25 mm."""
+    effect = opened.page.locator("#effect")
+    opened.wait("data-checked=reach")
+    expect(effect).to_be_hidden()
+    opened.put("chamber.height_mm", 25)
+    told = "With these values the part now goes out through the ceiling, by an opening of "
+    expect(effect).to_contain_text(told, timeout=WAIT)
+    opened.wait("data-checked=reach")
+    opened.page.click("#undo")
+    expect(effect).to_be_hidden(timeout=WAIT)
+    opened.wait("data-checked=reach")
+
+
 def test_what_is_drawn_stays_where_no_form_has_changed(opened: Page) -> None:
     page, held, is_held = opened.page, [], True
     drawn = """async () => {
