@@ -137,6 +137,8 @@ TIME = "time_to_98_s"
 # The number of replicas says more than the rule by which it was chosen.
 REPLICAS = "process.accuracy.replicas"
 STOPPING_RULES = ("process.accuracy.objective_half_width", "process.accuracy.max_replicas")
+# A treatment time, and by what share it may differ: of 1202 s in place of 1200 s nothing is told.
+TREATMENT_TIME, SAME_TIME = "process.treatment_time_s", 0.005
 # Values of a design that make no other chamber or process.
 NOT_COMPARED: dict[str, Any] = {"part": {"mesh", "unit"}, "to_settle": True, "settled": True}
 
@@ -327,13 +329,17 @@ def _values_of(design: Design) -> dict[str, object]:
 def values_before(result: Result, design: Design) -> dict[str, object]:
     """Return the values of a result's design that a design has otherwise now, by dotted name.
 
-    A value that the result lacks is None. Values of the accuracy are left out.
+    A value that the result lacks is None. Values of the accuracy are left out, and a treatment time
+    that is nearly the same.
     """
     before, now = _values_of(result.design), _values_of(design)
+    times = result.design.process.treatment_time, design.process.treatment_time
+    same = {TREATMENT_TIME} if math.isclose(*times, rel_tol=SAME_TIME) else set()
     return {
         name: before.get(name)
         for name in dict.fromkeys([*before, *now])
         if str(before.get(name)) != str(now.get(name))
+        and name not in same
         and not name.startswith(("process.accuracy.", "ranges."))
         and not name.endswith(".v0_for")
     }

@@ -28,7 +28,13 @@ from chamberopt.page.acts import list_results
 from chamberopt.printers import terminal
 from chamberopt.results.arrays_file import ResultArrays
 from chamberopt.results.command_records import difference_record
-from chamberopt.results.compare.comparison import Comparison, _by_the_law, compare, coverage_after
+from chamberopt.results.compare.comparison import (
+    Comparison,
+    _by_the_law,
+    compare,
+    coverage_after,
+    values_before,
+)
 from chamberopt.results.compare.difference import MAX_TIME_RATIO, confidence_of_each, difference
 from chamberopt.results.load import load_result
 from chamberopt.simulation.evaluation import Evaluation
@@ -156,6 +162,16 @@ def test_what_differs_is_named_and_measured(tmp_path: Path) -> None:
     assert gap.half_width == pytest.approx(np.hypot(first.half_width, second.half_width), rel=0.3)
     assert row(comparison_text(both), "mean_coverage").endswith("yes")
     assert "heavy - light: independent, on other seeds" in comparison_text(both)
+
+
+@pytest.mark.parametrize(("share", "is_told"), [(1.002, False), (0.998, False), (1.02, True)])
+def test_a_result_is_of_another_treatment_time_only_where_it_matters(
+    share: float, is_told: bool
+) -> None:
+    result: Any = SimpleNamespace(design=PLATE)
+    key, time = "process.treatment_time_s", PLATE.process.treatment_time_s
+    before = values_before(result, PLATE.changed({key: share * time}))
+    assert before == ({key: time} if is_told else {})
 
 
 def test_pairs_by_hand() -> None:
