@@ -52,7 +52,7 @@ from chamberopt.page.answers import (
     surface_answer,
 )
 from chamberopt.page.checker import Checker
-from chamberopt.page.duration import duration_in_words, tried_duration
+from chamberopt.page.duration import AS_ASKED, EFFORTS, Foretold, foretold, tried
 from chamberopt.page.edited_file import OF_MATTERS, EditedFile, custom_shape, design_fields
 from chamberopt.page.further_study import write_further_study
 from chamberopt.page.page_words import (
@@ -420,10 +420,16 @@ class Acts:
             raise InputError(f"{command}: not a command of this page: {', '.join(COMMANDS)}")
         name = f"./{what.relative_to(self._path.parent).as_posix()}"
         self._refuse_shape(what)
+        effort = str(asked.get("effort", AS_ASKED))
+        if effort not in EFFORTS:
+            raise InputError(f"{effort}: not an effort of this page: {', '.join(EFFORTS)}")
+        scaled = [] if command != "simulate" or effort == AS_ASKED else [f"--effort={effort}"]
         sweeps = ["--sobol", str(int(asked["points"]))] if command == "sweep" else []
-        folder = self._free_folder(f"{what.stem}-sweep" if sweeps else what.stem)
-        ranges = ["--no-ranges"] if not sweeps and asked.get("ranges") is False else []
-        arguments = [command, name, *sweeps, *ranges, "--out", folder]
+        own = f"-{effort}" if scaled else "-sweep" if sweeps else ""
+        folder = self._free_folder(f"{what.stem}{own}")
+        is_bare = asked.get("ranges") is False or (scaled and effort == "quick")
+        ranges = ["--no-ranges"] if not sweeps and is_bare else []
+        arguments = [command, name, *scaled, *sweeps, *ranges, "--out", folder]
         return self._command.start(arguments, self._path.parent, "" if sweeps else folder)
 
     def make(self, asked: Any) -> dict[str, object]:
@@ -437,21 +443,21 @@ class Acts:
         return self._making.status()
 
     def duration(self, asked: Any) -> dict[str, object]:
-        """Return in words how long a design or study will take; "" if nothing is known of it.
+        """Return what is known before a design or study is simulated, for each effort it may take.
 
         `searched` is the folder of a search of the study, the newest; "" if there is none.
         """
         what = self.inside(str(asked["of"]))
         self._refuse_shape(what)
         folders = _result_folders(self._path.parent)
-        words = duration_in_words(what, folders)
-        return {"words": words, "searched": self._searched(what, folders)}
+        known = foretold(what, folders, asked.get("ranges") is not False)
+        return {"efforts": _efforts(known), "searched": self._searched(what, folders)}
 
-    def tried(self, asked: Any) -> dict[str, str]:
-        """Return in words how long a design will take, by a moment of it; "" if that fails."""
+    def tried(self, asked: Any) -> dict[str, object]:
+        """Return how long a design will take, by a moment of it; nothing if that fails."""
         what = self.inside(str(asked["of"]))
         self._refuse_shape(what)
-        return {"words": tried_duration(what)}
+        return {"efforts": _efforts(tried(what, asked.get("ranges") is not False))}
 
     def _searched(self, file: Path, folders: Sequence[Path]) -> str:
         """Return the first of some folders in which a study was searched; "" for a design."""
@@ -576,6 +582,13 @@ class Acts:
         """Return the first new or empty folder of results/NAME, results/NAME-2 and so on."""
         self.inside("results")  # the folder may be a link to elsewhere
         return free_folder(self._path.parent, Path("results", name))
+
+
+def _efforts(known: Mapping[str, Foretold]) -> dict[str, object]:
+    return {
+        name: {"words": one.words, "few": on_page(one.few) if one.few else []}
+        for name, one in known.items()
+    }
 
 
 def _border(asked: Any) -> Border:

@@ -9,21 +9,25 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.child import Child, ChildLostError
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import core_count
+from chamberopt.common.number_text import plain
 from chamberopt.common.toml_fields import read_toml
 from chamberopt.design.design import Design
 from chamberopt.design.load import is_study, load_design
+from chamberopt.design.ranges import unknowns
 from chamberopt.results.load import Result, load_result
 from chamberopt.search.ask_and_tell import most_evaluations
 from chamberopt.search.study import load_study
-from chamberopt.simulation.effort import Effort
+from chamberopt.simulation.effort import SCALES, Effort, Scale, scaled
 from chamberopt.simulation.replicas import simulate_seed
 from sim_core import SceneError, SimulationError
 
@@ -32,17 +36,40 @@ MINUTE, HOUR = 60, 3600
 # Times as long as one design's replicas that a study may take, as each candidate takes replicas
 # until it can be told from the best: 2 min were foretold of a study that took 228 s.
 SPREAD = 3
-# A design is tried for MOMENT_S of simulation, and given up after TRY_S. Its pace then is so many
-# times off: the balls fly higher later on, and other work takes cores.
-MOMENT_S, TRY_S, UNSURE = 2.0, 120.0, 1.5
+# A design is tried on all cores for MOMENT_S of simulation, and given up after TRY_S. Its pace then
+# is so many times off: the balls fly higher later on, and other work takes cores.
+MOMENT_S, TRY_S, UNSURE = 3.0, 120.0, 1.3
+# s beside the replicas: to start, build and check, and to write and draw what is found. 7 to 14 s
+# were measured of plate, blade and gear.
+AROUND_S = 10.0
+# Time of the ends of what is not calibrated over that of the figures, as proposals count it too.
+ENDS = 1.2
+AS_ASKED = "asked"
+EFFORTS: dict[str, Scale | None] = {AS_ASKED: None, **{scale: scale for scale in SCALES}}
 
 
-def duration_in_words(path: Path, results: Iterable[Path]) -> str:
-    """Return how long a design or study will take, such as "about 2 minutes"; "" if unknown.
+class Foretold(NamedTuple):
+    """What is known before a run.
+
+    Attributes:
+        words: how long it takes, such as "about 2 minutes"; "" if that is not known.
+        few: why it tells too little, and the remedy; "" if it is enough, or not known.
+    """
+
+    words: str
+    few: str = ""
+
+
+def foretold(path: Path, results: Iterable[Path], ranges: bool = True) -> dict[str, Foretold]:
+    """Return what is known of each effort that a design may take, by names of EFFORTS.
+
+    A study has the one that it asks for. Nothing is known without a result of a like design.
 
     Args:
         path: file of the design or study.
         results: folders of results, the newest first.
+        ranges: whether the ends of what is not calibrated are simulated too. A quick look, and a
+            study, leave that to themselves.
     """
     evaluations = 1
     if is_study(read_toml(path, "design")[1]):
@@ -53,58 +80,101 @@ def duration_in_words(path: Path, results: Iterable[Path]) -> str:
     for folder in results:
         with suppress(InputError):
             result = load_result(folder)
-            if _is_like(design, result.design):
+            if not _is_like(design, result.design):
+                continue
+            if evaluations > 1:
                 seconds = _whole_seconds(design, evaluations, result)
-                is_rough = evaluations > 1 and result.record.study is None
-                return _in_words(seconds, SPREAD * seconds if is_rough else seconds)
-    return ""
+                most = SPREAD * seconds if result.record.study is None else seconds
+                return {AS_ASKED: Foretold(_in_words(seconds, most))}
+            return {
+                name: _by_result(scaled(design, scale), result, ranges and scale != "quick")
+                for name, scale in EFFORTS.items()
+            }
+    return {}
 
 
-def tried_duration(path: Path) -> str:
-    """Return how long a design will take by a moment of it, such as "about 2 to 5 minutes".
+def tried(path: Path, ranges: bool = True) -> dict[str, Foretold]:
+    """Return how long a design will take by a moment of it, as of `foretold`.
 
-    It runs in a child process, as building a chamber may take long. It is "" for a study, and where
-    the design cannot be tried within TRY_S.
+    It runs in a child process, as building a chamber may take long. Nothing is known of a study,
+    nor where the design cannot be tried within TRY_S.
     """
     if is_study(read_toml(path, "design")[1]):
-        return ""
+        return {}
     with suppress(InputError, SceneError, SimulationError, ChildLostError), Child(TRY_S) as child:
-        child.ask(_tried_seconds, path)
-        least, most = child.answer()
-        return _in_words(least, most)
-    return ""
+        child.ask(_tried_pace, path)
+        pace, design = child.answer(), load_design(path)
+        return {
+            name: Foretold(_at_pace(scaled(design, scale), pace, ranges and scale != "quick"))
+            for name, scale in EFFORTS.items()
+        }
+    return {}
 
 
 class _TriedError(Exception):
     """Raised to end a simulation of which enough is known."""
 
 
-def _tried_seconds(path: Path) -> tuple[float, float]:
-    """Return the least and the most time [s] of a design's figures, by a moment of one replica.
+def _tried_pace(path: Path) -> float:
+    """Return the time [s] that a simulated second of a design's replicas takes, one on each core.
 
-    Replicas run beside each other on all cores, and there may be more until they are sure.
+    It is that of all steps of a design with steps.
     """
     design = load_design(path)
     built = build_chamber(design)
     one = next(iter(design.in_steps.values()))
     chamber = (*built.steps, built)[0]
-    clock: list[tuple[float, float]] = []  # share of the replica, and the time that was [s]
-
-    def tell(_: int, part: float, __: object) -> None:
-        clock.append((part, time.perf_counter()))
-        if clock[-1][1] - clock[0][1] > MOMENT_S:
-            raise _TriedError
-
     mesh = chamber_mesh(chamber)
-    with suppress(_TriedError):
-        simulate_seed(one, chamber, mesh, one.process.seed, tell)
-    (first, began), (last, ended) = clock[0], clock[-1]
-    if last <= first:
-        raise SimulationError("it is too short to be tried")
-    replica = (ended - began) / (last - first) * max(len(built.steps), 1)
+
+    def pace(seed: int) -> float:
+        clock: list[tuple[float, float]] = []  # share of the replica, and the time that was [s]
+
+        def tell(_: int, part: float, __: object) -> None:
+            clock.append((part, time.perf_counter()))
+            if clock[-1][1] - clock[0][1] > MOMENT_S:
+                raise _TriedError
+
+        with suppress(_TriedError):
+            simulate_seed(one, chamber, mesh, seed, tell)
+        (first, began), (last, ended) = clock[0], clock[-1]
+        if last <= first:
+            raise SimulationError("it is too short to be tried")
+        return (ended - began) / (last - first)
+
+    seeds = range(design.process.seed, design.process.seed + core_count())
+    with ThreadPoolExecutor(len(seeds)) as threads:
+        replica = max(threads.map(pace, seeds))
+    return replica * max(len(built.steps), 1) / _replica_s(design)
+
+
+def _at_pace(design: Design, pace: float, ranges: bool) -> str:
+    """Return in words how long a design takes, by the time that a simulated second takes [s]."""
     effort, cores = Effort.of(design.process.accuracy), core_count()
-    least, most = (replica * math.ceil(count / cores) for count in (effort.first, effort.most))
-    return least / UNSURE, most * UNSURE
+    times = 1.0 + ENDS if ranges and unknowns(design) else 1.0
+    least, most = (
+        times * pace * _replica_s(design) * math.ceil(count / cores)
+        for count in (effort.first, effort.most)
+    )
+    words = _in_words(AROUND_S + least / UNSURE, AROUND_S + least * UNSURE)
+    if most <= UNSURE * least:
+        return words
+    longest = _in_words(AROUND_S + most * UNSURE, AROUND_S + most * UNSURE).removeprefix("about ")
+    return f"{words}, and up to {longest} until it is as sure as it asks"
+
+
+def _by_result(design: Design, result: Result, ranges: bool) -> Foretold:
+    """Return how long a design takes by a result of a like one, and whether it tells too little."""
+    seconds = AROUND_S + _whole_seconds(design, 1, result, ranges)
+    needed = result.record.field.simulated_s_needed.mean_and_std
+    accuracy, few = design.process.accuracy, ""
+    most = Effort.of(accuracy).most * accuracy.simulated_time_s
+    if needed is not None and most < needed:
+        enough = float(f"{1.1 * needed * accuracy.simulated_time_s / most:.2g}")
+        few = (
+            f"too little to tell the mean coverage, by {result.folder.name}: it takes "
+            f"process.accuracy.simulated_time_s = {plain(enough)}"
+        )
+    return Foretold(_in_words(seconds, seconds), few)
 
 
 def _is_like(one: Design, other: Design) -> bool:
@@ -116,11 +186,17 @@ def _form(design: Design) -> tuple[str, str]:
     return design.part.mesh_path.name, design.chamber.shape
 
 
-def _whole_seconds(design: Design, evaluations: int, result: Result) -> float:
-    """Return the time [s] that a design, or so many evaluations of a study, take, by a result."""
+def _whole_seconds(design: Design, evaluations: int, result: Result, ranges: bool = True) -> float:
+    """Return the time [s] that a design, or so many evaluations of a study, take, by a result.
+
+    Args:
+        ranges: whether the ends of what is not calibrated are simulated after the figures too.
+    """
     if evaluations == 1:
-        ranges = result.record.ranges  # whose ends are simulated after the figures
-        return _seconds(design, result) * (1.0 + (ranges.cost if ranges else 0.0))
+        known, cost = result.record.ranges, 0.0
+        if ranges:
+            cost = known.cost if known else ENDS if unknowns(design) else 0.0
+        return _seconds(design, result) * (1.0 + cost)
     if study := result.record.study:  # many of its candidates take fewer replicas than its best
         return evaluations * study.seconds / study.evaluations
     return evaluations * _seconds(design, result)
@@ -139,10 +215,14 @@ def _seconds(design: Design, result: Result) -> float:
     return sum(result.record.timings_s.values()) * effort / (_balls_s(result.design) * replicas)
 
 
+def _replica_s(design: Design) -> float:
+    """Return the simulated time of a replica with its warm-up [s]."""
+    return design.process.recorded_time + design.process.accuracy.warmup_time
+
+
 def _balls_s(design: Design) -> float:
     """Return the balls of a replica times its simulated time [s]."""
-    process = design.process
-    return design.shot.count * (process.recorded_time + process.accuracy.warmup_time)
+    return design.shot.count * _replica_s(design)
 
 
 def _in_words(least: float, most: float) -> str:

@@ -15,12 +15,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from chamberopt.common.estimate import Estimate, shared_half_width
 from chamberopt.design.process import MAX_POINTS
 
 if TYPE_CHECKING:
+    from chamberopt.design.design import Design
     from chamberopt.design.process import Accuracy
 
 LITTLE = 1.0 / 8.0  # share of a half-width that is not worth more replicas
@@ -37,6 +38,29 @@ Reason = Literal["replicas", "accuracy", "max_replicas", "points", "user"]
 """Why a simulation ended: its number of replicas was given; the wanted accuracy was reached; the
 largest number was; more replicas bring nothing, as the error is in the choice of the points; or the
 user stopped it."""
+
+
+Scale = Literal["quick", "thorough"]
+"""How much is simulated instead of what a design asks for."""
+
+SCALES: dict[Scale, float] = {"quick": 0.25, "thorough": 4.0}  # times the simulated time
+MOST_TIME_S = 1e4  # of a replica in a design
+
+
+def scaled(design: Design, scale: Scale | None) -> Design:
+    """Return a design that is simulated for a part or a multiple of the time that it asks for.
+
+    A quick one takes no more replicas than it begins with. None leaves the design as it is.
+    """
+    if scale is None:
+        return design
+    time = SCALES[scale] * design.process.accuracy.simulated_time_s
+    values: dict[str, Any] = {
+        "process.accuracy.simulated_time_s": float(f"{min(time, MOST_TIME_S):.4g}")
+    }
+    if scale == "quick":
+        values["process.accuracy.objective_half_width"] = None
+    return design.changed(values)
 
 
 def narrows(figure: Estimate) -> bool:

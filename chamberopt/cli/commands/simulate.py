@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 from chamberopt.cli import console
 from chamberopt.cli.options import (
@@ -25,6 +26,7 @@ def simulate(
     *,
     accuracy: Accuracy = None,
     time: TreatmentTime = None,
+    effort: Literal["quick", "thorough"] | None = None,
     analytic: bool = False,
     tolerances: bool = False,
     ranges: bool = True,
@@ -43,6 +45,9 @@ def simulate(
     ----------
     design
         Design file (.toml).
+    effort
+        Simulate a quarter of the file's process.accuracy.simulated_time_s in no more replicas than
+        it begins with, which tells little of single places; or four times as long.
     analytic
         Use the exact cylinder, box or prism instead of its triangles, if the chamber is one.
     tolerances
@@ -59,11 +64,13 @@ def simulate(
     from chamberopt.design.tolerances import USUAL_IN_WORDS
     from chamberopt.documents.terminal_lines import result_end
     from chamberopt.peening.tolerances import plan_tolerances
+    from chamberopt.simulation.effort import scaled
     from chamberopt.workflows.simulate import SimulationSettings, simulate_design
 
     candidate = load_design(design)
     if values := given_values(accuracy, time):
         candidate = candidate.changed(values)
+    candidate = scaled(candidate, effort)
     if tolerances:
         plan_tolerances(candidate)  # reports wrong tolerances before the work begins
         if candidate.tolerances is None:

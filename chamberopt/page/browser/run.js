@@ -66,28 +66,41 @@ function takeQuestion(file) {
 async function tellDuration() {
   const of = find("of").value;
   refused = searched = "";
-  const known = await ask("/duration", { of }).catch((error) => { refused = wordsOf(error); });
+  const ranges = find("ranges").checked, known = await ask("/duration", { of, ranges }).catch((error) => { refused = wordsOf(error); });
   if (find("of").value !== of) return;
   find("lasts").className = refused ? "wrong" : "soft";
-  find("lasts").replaceChildren(...(refused ? [...onPage(refused), element("p", { hidden: !chosen()?.asks, textContent: "The search below asks the same between values that hold those of the design." })]
-    : [known.words ? `It will take ${known.words}.` : ""]));
-  if (known && !known.words && !isRunning && !find("run").hidden) await tryDuration(of);
+  find("lasts").replaceChildren(...(refused ? [...onPage(refused), element("p", { hidden: !chosen()?.asks, textContent: "The search below asks the same between values that hold those of the design." })] : []));
+  showEfforts(known?.efforts ?? {});
+  if (known && !known.efforts.asked && !isRunning && !find("run").hidden) await tryDuration(of, ranges);
   searched = known?.searched ?? "";
   find("searched").textContent = searched;
   allow();
 }
 document.querySelector("[data-tab=run]").addEventListener("click", () => setTimeout(tellDuration)); // once the tab is shown
+find("ranges").addEventListener("change", tellDuration);
+
+// What is known of each effort stands beside it: its time, and why it tells too little; of a study below its button.
+const effort = () => document.querySelector("input[name=effort]:checked").value;
+function showEfforts(efforts, origin = "") {
+  const isDesign = chosen()?.kind === "design";
+  for (const one of document.querySelectorAll("[name=effort]")) {
+    const { words = "", few = [] } = efforts[one.value] ?? {}, place = one.parentElement.querySelector("small");
+    place.replaceChildren(...(words ? [`${words}${origin}`] : []), ...(few.length ? [element("span", { className: "warning" }, "; ", ...onPage(few))] : []));
+  }
+  if (!isDesign && efforts.asked) find("lasts").textContent = `It will take ${efforts.asked.words}.`;
+}
 
 // Of a design without results a moment is simulated, once for each version of its file.
 const tried = new Map();
-async function tryDuration(of) {
+async function tryDuration(of, ranges) {
   if (chosen()?.kind !== "design") return;
-  const key = `${of} ${state.file.read}`, tell = (words) => { if (find("of").value === of && !isRunning) find("lasts").textContent = words; };
+  const key = `${of} ${ranges} ${state.file.read}`, tell = (words) => { if (find("of").value === of && !isRunning) find("lasts").textContent = words; };
   if (!tried.has(key)) {
     tell("finding out how long it takes …");
-    tried.set(key, await ask("/tried", { of }).then(({ words }) => words, () => ""));
+    tried.set(key, await ask("/tried", { of, ranges }).then(({ efforts }) => efforts, () => ({})));
   }
-  tell(tried.get(key) ? `It will take ${tried.get(key)}, by a moment of it.` : "");
+  tell("");
+  if (find("of").value === of && find("ranges").checked === ranges) showEfforts(tried.get(key), ", by a moment of it");
 }
 
 // Limits of figures: name, label with unit, side and value of each.
@@ -197,7 +210,7 @@ listen(() => {
 
 for (const button of document.querySelectorAll("[data-command]")) button.addEventListener("click", () => attempt(async () => {
   await save();
-  await followToEnd(await ask("/start", { command: button.dataset.command, of: find("of").value, points: find("points").value, ranges: find("ranges").checked }));
+  await followToEnd(await ask("/start", { command: button.dataset.command, of: find("of").value, points: find("points").value, ranges: find("ranges").checked, effort: effort() }));
 }, find("run-fault")));
 find("more-of").addEventListener("click", () => attempt(async () => {
   await save();

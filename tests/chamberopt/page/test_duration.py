@@ -7,7 +7,19 @@ from typing import Any
 import pytest
 
 from chamberopt.design.load import save_design
-from chamberopt.page.duration import _in_words, _whole_seconds, duration_in_words, tried_duration
+from chamberopt.page import duration
+from chamberopt.page.duration import (
+    AROUND_S,
+    EFFORTS,
+    ENDS,
+    UNSURE,
+    _at_pace,
+    _by_result,
+    _in_words,
+    _whole_seconds,
+    foretold,
+    tried,
+)
 from chamberopt.results.load import Result
 from tests.helpers.results.short_plate import plate_result
 from tests.helpers.synthetic import DESIGNS
@@ -22,14 +34,21 @@ def test_it_grows_with_the_replicas(result: Result, tmp_path: Path) -> None:
     seconds = sum(result.record.timings_s.values()) / result.record.replicas
     replicas = round(600.0 / seconds)
     save_design(result.design.changed({"process.accuracy.replicas": replicas}), tmp_path / "a.toml")
-    assert duration_in_words(tmp_path / "a.toml", [tmp_path, result.folder]) == "about 10 minutes"
+    known = foretold(tmp_path / "a.toml", [tmp_path, result.folder], ranges=False)
+    assert known["asked"] == ("about 10 minutes", "")
+    accuracy = result.design.process.accuracy
+    whole, time = accuracy.simulated_time_s + accuracy.warmup_time_s, accuracy.simulated_time_s
+    for name, scale in (("quick", 0.25), ("thorough", 4.0)):
+        minutes = (600.0 * (1.0 + (scale - 1.0) * time / whole) + AROUND_S) / 60.0
+        assert known[name].words == f"about {round(minutes)} minutes"
 
 
 def test_a_study_takes_as_long_as_its_evaluations(result: Result, tmp_path: Path) -> None:
     save_design(result.design, tmp_path / "a.toml")
     study = 'design = "a.toml"\n[vary]\n"chamber.height_mm" = { low = 20, high = 60 }\n'
     (tmp_path / "study.toml").write_text(f"{study}[optimizer]\nevaluations = 100000\n")
-    words = duration_in_words(tmp_path / "study.toml", [result.folder])
+    (words, _), *others = foretold(tmp_path / "study.toml", [result.folder]).values()
+    assert not others
     assert words.endswith(("minutes", "hours"))
     assert " to " in words  # by a design's result it is not known how many replicas they take
     known = SimpleNamespace(study=SimpleNamespace(seconds=366.0, evaluations=6))
@@ -40,13 +59,45 @@ def test_a_study_takes_as_long_as_its_evaluations(result: Result, tmp_path: Path
 def test_a_design_without_results_is_tried_for_a_moment(result: Result, tmp_path: Path) -> None:
     """A study is not."""
     save_design(result.design, tmp_path / "a.toml")
-    assert tried_duration(tmp_path / "a.toml").startswith("about ")
+    known = tried(tmp_path / "a.toml")
+    assert [*known] == [*EFFORTS]
+    assert all(one.words.startswith("about ") for one in known.values())
     (tmp_path / "study.toml").write_text('design = "a.toml"\n[vary]\n')
-    assert tried_duration(tmp_path / "study.toml") == ""
+    assert tried(tmp_path / "study.toml") == {}
+
+
+def test_a_time_that_is_not_sure_has_its_usual_and_its_longest_end(
+    result: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At 60 s a simulated second on two cores, until the figures are sure or at once."""
+    monkeypatch.setattr(duration, "core_count", lambda: 2)
+    settings = {"replicas": 10, "simulated_time_s": 1.8, "warmup_time_s": 0.2, "max_replicas": 40}
+    key = "process.accuracy."
+    design = result.design.changed({f"{key}{name}": one for name, one in settings.items()})
+    assert _at_pace(design, 60.0, ranges=False) == "about 8 to 13 minutes"
+    sure = design.changed({f"{key}objective_half_width": 0.01})
+    longest = ", and up to 52 minutes until it is as sure as it asks"
+    assert _at_pace(sure, 60.0, ranges=False) == f"about 8 to 13 minutes{longest}"
+    assert _in_words(600 / UNSURE + AROUND_S, 600 * UNSURE + AROUND_S) == "about 8 to 13 minutes"
+
+
+def test_too_little_is_told_before_with_the_remedy(result: Result) -> None:
+    needed = SimpleNamespace(mean_and_std=30.0)
+    record = SimpleNamespace(
+        **{**vars(result.record), "field": SimpleNamespace(simulated_s_needed=needed)}
+    )
+    like: Any = SimpleNamespace(record=record, design=result.design, folder=result.folder)
+    key = "process.accuracy."
+    short = result.design.changed({f"{key}replicas": 10, f"{key}simulated_time_s": 2.0})
+    few = _by_result(short, like, ranges=False).few
+    assert few.startswith("too little to tell the mean coverage, by result: it takes ")
+    assert few.endswith("process.accuracy.simulated_time_s = 3.3")
+    enough = short.changed({f"{key}simulated_time_s": 3.3})
+    assert _by_result(enough, like, ranges=False).few == ""
 
 
 def test_nothing_is_said_of_another_part(result: Result) -> None:
-    assert duration_in_words(DESIGNS / "gear.toml", [result.folder]) == ""
+    assert foretold(DESIGNS / "gear.toml", [result.folder]) == {}
 
 
 @pytest.mark.parametrize(
@@ -73,9 +124,11 @@ def test_a_design_takes_as_much_longer_as_it_has_more_balls_and_simulates_longer
     result: Result,
 ) -> None:
     design, record = result.design, result.record
-    ranges = record.ranges.cost if record.ranges else 0.0
+    assert record.ranges is None
+    own = sum(record.timings_s.values())
+    assert _whole_seconds(design, 1, result, ranges=False) == pytest.approx(own)
     known = _whole_seconds(design, 1, result)
-    assert known == pytest.approx(sum(record.timings_s.values()) * (1.0 + ranges))
+    assert known == pytest.approx((1.0 + ENDS) * own)  # of a friction that is not calibrated
     accuracy = design.process.accuracy
     whole = accuracy.simulated_time_s + accuracy.warmup_time_s
     longer = {"process.accuracy.simulated_time_s": 3.0 * accuracy.simulated_time_s}
@@ -88,4 +141,4 @@ def test_a_design_takes_as_much_longer_as_it_has_more_balls_and_simulates_longer
         assert _whole_seconds(design.changed(changes), 1, result) == pytest.approx(times * known)
     if record.study is None:  # of several candidates each takes as long; ranges are the best's
         several = _whole_seconds(design, 4, result)
-        assert several == pytest.approx(4.0 * known / (1.0 + ranges))
+        assert several == pytest.approx(4.0 * own)

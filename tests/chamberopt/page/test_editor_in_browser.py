@@ -757,7 +757,8 @@ def test_a_study_of_the_sliders_is_run_and_seen(opened: Page) -> None:
     expect(page.locator("#progress")).to_contain_text("finished", timeout=WAIT)
     expect(simulate).to_have_text("Simulate")
     assert load_design(folder / "design.toml").process.treatment_time_s == 6
-    expect(page.locator("#lasts")).to_contain_text(re.compile(r"about \d+ s"))
+    asked = page.locator("#efforts label", has=page.locator("[value=asked]"))
+    expect(asked).to_contain_text(re.compile(r"about \d+ s"))
     result = json.loads((folder / "results" / "design" / "result.json").read_text())
     out = folder / "by-command"
     assert main(["simulate", str(folder / "design.toml"), "--no-ranges", "--out", str(out)]) == 0

@@ -97,6 +97,11 @@ def test_a_report_cannot_use_the_server(served: Served) -> None:
     [
         ("/start", {"command": "simulate", "of": "../design.toml"}, "outside the folder"),
         ("/start", {"command": "new", "of": "design.toml"}, "not a command of this page"),
+        (
+            "/start",
+            {"command": "simulate", "of": "design.toml", "effort": "huge"},
+            "huge: not an effort of this page: asked, quick, thorough",
+        ),
         ("/make", {"paper": "report", "of": "../other"}, "outside the folder"),
         ("/shown", {"folders": ["/etc"]}, "outside the folder"),
         ("/shown", {"folders": ["."]}, "result.json"),
@@ -180,9 +185,9 @@ def test_a_study_is_asked_with_limits_in_the_units_of_the_page(served: Served) -
 
 
 def test_a_report_is_begun_beside_a_command(served: Served) -> None:
-    asked = {"command": "simulate", "of": "design.toml", "ranges": False}
+    asked = {"command": "simulate", "of": "design.toml", "effort": "quick"}
     started = served.ask("/start", asked)
-    assert "--no-ranges" in started["command"]
+    assert "--effort=quick --no-ranges --out results/design-quick" in started["command"]
     assert started["exit"] is None
     now = served.ask("/make", {"paper": "sheet", "of": "results/none"})
     assert now["command"] == "chamberopt report ./results/none --sheet"

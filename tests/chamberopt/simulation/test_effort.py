@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from chamberopt.common.estimate import Estimate, estimate, shared_half_width
+from chamberopt.design.load import load_design
 from chamberopt.simulation.effort import (
     MIN_REPLICAS_TO_STOP,
     Effort,
@@ -14,7 +15,9 @@ from chamberopt.simulation.effort import (
     _growth,
     narrows,
     points_remedy,
+    scaled,
 )
+from tests.helpers.synthetic import DESIGNS
 
 ASKED = Effort(first=10, most=200, points=20_000, wanted=0.01)
 
@@ -26,6 +29,19 @@ def figure(half_width: float, shared: float = 0.0) -> Estimate:
 
 def next_count(done: int, half_width: float, shared: float = 0.0) -> int:
     return ASKED.after(done, figure(half_width, shared), 1.0, Step(done)).replicas
+
+
+def test_a_quick_look_is_short_and_a_thorough_one_long() -> None:
+    key = "process.accuracy."
+    asked = load_design(DESIGNS / "gear.toml").changed(
+        {f"{key}simulated_time_s": 2.0, f"{key}objective_half_width": 0.01}
+    )
+    quick, thorough = (scaled(asked, one).process.accuracy for one in ("quick", "thorough"))
+    assert (quick.simulated_time_s, thorough.simulated_time_s) == (0.5, 8.0)
+    assert (quick.objective_half_width, thorough.objective_half_width) == (None, 0.01)
+    assert scaled(asked, None) is asked
+    longest = asked.changed({f"{key}simulated_time_s": 9000.0})
+    assert scaled(longest, "thorough").process.accuracy.simulated_time_s == 1e4
 
 
 def test_how_many_replicas_come_next() -> None:
