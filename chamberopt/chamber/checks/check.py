@@ -26,6 +26,7 @@ from chamberopt.chamber.checks.gaps import (
     pocket_warnings,
     surface_warnings,
 )
+from chamberopt.chamber.checks.jams import JAM_BAND
 from chamberopt.chamber.checks.openings import find_walls_in_holes
 from chamberopt.chamber.checks.place_names import CEILING, SIDE_WALL, around, mm2, surface_names
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
@@ -343,9 +344,11 @@ def _side_wall_warnings(design: Design, chamber: Chamber) -> list[DesignWarning]
 def _hole_warnings(design: Design, chamber: Chamber) -> list[DesignWarning]:
     """Return a warning if pieces of a wall stand by themselves in holes of the part, else [].
 
-    A proposal that leaves holes open tells of them among what is to be settled.
+    Holes that no ball gets into are left out. A proposal that leaves holes open tells of them among
+    what is to be settled.
     """
-    found = find_walls_in_holes(chamber)
+    least = JAM_BAND[0] * min(design.ball_diameters)
+    found = [one for one in find_walls_in_holes(chamber) if min(one.opening.size) >= least]
     told = {MatterKind.HOLE, MatterKind.HOLES}
     if not found or any(matter_of(one).kind in told for one in design.to_settle):
         return []

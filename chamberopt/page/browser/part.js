@@ -6,6 +6,7 @@ function showParts({ quantities, scenes, scales, kinds }) {
   const controls = { quantity: find("quantity"), time: find("time"), fit: find("fit") };
   const label = find("label");
   const CARD = ["coverage", "time-98", "impacts", "speed"]; // beside the pointer; all numbers are in the list of kept places
+  const FIRST = ["coverage", "interval", "speed", "impacts", "angle", "time-98"]; // of a kept place; the others are folded
   const SOLID = ["part", "few", "unreached", "rest"];
 
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
@@ -129,31 +130,30 @@ function showParts({ quantities, scenes, scales, kinds }) {
     const hit = event.buttons || views[i].tool ? null : views[i].at(event, SOLID), scene = scenes[i];
     if (!hit || !["part", "few"].includes(hit.name)) return null;
     const k = hit.corner, t = scene.triangle[k];
-    const shown = [], rows = quantities.map((one) => {
+    const shown = [], first = [], others = [];
+    for (const one of quantities) {
       const now = one.name === "coverage";
       const value = now ? covered(scene.columns.density[k], scene) : scene.columns[one.name][k];
       const row = [now ? `coverage after ${number(seconds())} s` : one.label, `${number(value)} ${one.unit}`];
       if (CARD.includes(one.name) || one === chosen()) shown.push(row);
-      return row;
-    });
-    const surface = scene.names[scene.surface[t]] ?? "no name", zone = scene.zones[scene.zone[t] - 1] ?? "none";
-    for (const table of [rows, shown]) {
-      if (scene.names.length) table.unshift(["surface", surface]);
-      if (scene.zones.length) table.unshift(["zone", zone]);
+      if (FIRST.includes(one.name)) first[FIRST.indexOf(one.name)] = row; else others.push(row);
     }
-    rows.unshift(["place x, y, z", Measure.at(hit.place)]);
-    rows.push([`coverage of the triangle after ${number(scene.treatment)} s`, `${number(scene.own.coverage[t])} %`],
-      ["width of its 95 % interval", `${number(scene.own.interval[t])} %`],
-      ["simulated impacts on the triangle", String(scene.impacts[t])]);
-    return { rows, shown, place: hit.place, title: `element ${scene.element[t]}, triangle ${scene.number[t]} of the part` };
+    const surface = scene.names[scene.surface[t]] ?? "no name", zone = scene.zones[scene.zone[t] - 1] ?? "none";
+    const where = [...(scene.zones.length ? [["zone", zone]] : []), ...(scene.names.length ? [["surface", surface]] : [])];
+    shown.unshift(...where);
+    others.push([`coverage of the triangle after ${number(scene.treatment)} s`, `${number(scene.own.coverage[t])} %`],
+      ["width of the triangle's 95 % interval", `${number(scene.own.interval[t])} %`],
+      ["simulated impacts on the triangle", String(scene.impacts[t])],
+      ["triangle", `element ${scene.element[t]}, triangle ${scene.number[t]} of the part`]);
+    return { first: [...first.filter(Boolean), ...where, ["place x, y, z", Measure.at(hit.place)]], others, shown, place: hit.place };
   }
 
   function point(event, i) {
-    const { rows, shown } = known(event, i) ?? {};
-    label.hidden = !rows;
+    const { first, others, shown } = known(event, i) ?? {};
+    label.hidden = !shown;
     if (label.hidden) return;
     const table = document.createElement("table");
-    table.createCaption().textContent = `a click lists all ${rows.length} numbers`;
+    table.createCaption().textContent = `a click lists all ${first.length + others.length} numbers`;
     for (const [name, value] of shown) {
       const row = table.insertRow();
       row.insertCell().textContent = name;
@@ -169,30 +169,35 @@ function showParts({ quantities, scenes, scales, kinds }) {
   }
 
   // Places that were clicked, a row each with the number that marks it in the view, and buttons to copy and to empty their list.
-  const kept = [], places = find("places"), parts = ["h3", "div", "button", "button"].map((tag) => document.createElement(tag));
-  const [title, wide, copy, empty] = parts;
+  const kept = [], places = find("places"), parts = ["h3", "div", "button", "button", "button"].map((tag) => document.createElement(tag));
+  const [title, wide, more, copy, empty] = parts;
   [title, copy, empty].forEach((one, i) => { one.textContent = ["Places kept", "Copy the list", "Empty it"][i]; });
   wide.className = "wide";
-  places.replaceChildren(title, wide, copy, " ", empty);
+  places.replaceChildren(title, wide, more, " ", copy, " ", empty);
   function showKept() {
-    const names = [...new Set(kept.flatMap(({ rows }) => rows.map(([name]) => name)))];
+    const named = (how) => [...new Set(kept.flatMap((one) => one[how].map(([name]) => name)))], first = named("first"), others = named("others");
     const table = document.createElement("table"), head = table.createTHead().insertRow(), body = table.createTBody();
-    for (const name of names) head.append(Object.assign(document.createElement("th"), { textContent: name }));
+    const folded = (cell, k) => { if (k >= first.length) cell.className = "more"; return cell; };
+    [...first, ...others].forEach((name, k) => head.append(folded(Object.assign(document.createElement("th"), { textContent: name }), k)));
     for (const one of kept) {
-      const row = body.insertRow(), values = new Map(one.rows);
-      for (const name of names) row.insertCell().textContent = values.get(name) ?? "";
+      const row = body.insertRow(), values = new Map([...one.first, ...one.others]);
+      [...first, ...others].forEach((name, k) => { folded(row.insertCell(), k).textContent = values.get(name) ?? ""; });
     }
     wide.replaceChildren(table);
+    more.textContent = wide.classList.contains("all") ? "Show the first numbers alone" : `Show ${others.length} more numbers`;
     places.hidden = !kept.length;
-    views.forEach((view, i) => view.texts("kept", kept.flatMap((one) => one.scene === i ? [[one.mark, one.place.toArray()]] : [])));
+    views.forEach((view, i) => { // a mark is cut away with the part that it is on
+      view.texts("kept", kept.flatMap((one) => one.scene === i ? [[one.mark, one.place.toArray()]] : [])).userData.on = "part";
+    });
   }
   function keep(event, i) {
-    const { rows, place, title: triangle } = known(event, i) ?? {}, mark = String(kept.length + 1);
-    if (!rows) return;
+    const { first, others, place } = known(event, i) ?? {}, mark = String(kept.length + 1);
+    if (!first) return;
     const result = scenes.length > 1 ? [["result", scenes[i].title]] : [];
-    kept.push({ scene: i, place, mark, rows: [["mark", mark], ...result, ["triangle", triangle], ...rows] });
+    kept.push({ scene: i, place, mark, first: [["mark", mark], ...result, ...first], others });
     showKept();
   }
+  more.addEventListener("click", () => { wide.classList.toggle("all"); showKept(); });
   empty.addEventListener("click", () => { kept.length = 0; showKept(); });
   copy.addEventListener("click", () => { // as a sheet of numbers takes it; a page of a file may have no clipboard
     const text = [...wide.querySelectorAll("tr")].map((row) => [...row.cells].map((cell) => cell.textContent).join("\t")).join("\n");

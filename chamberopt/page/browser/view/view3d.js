@@ -440,7 +440,8 @@ class View3D {
       one.center.x = (x - left) / width; // all of a text is in the window if what it names is
       const top = y - (1 - one.center.y) * height;
       const isOver = taken.some(([l, t, w]) => left < l + w && l < left + width && top < t + height && t < top + height);
-      if (isOver) one.layers.set(1);
+      const isCut = one.parent.userData.on && this.section.hides(one.position, one.parent.userData.on);
+      if (isOver || isCut) one.layers.set(1);
       else if (one.layers.mask === 1) taken.push([left, top, width]);
     }
   }

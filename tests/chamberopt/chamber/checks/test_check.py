@@ -314,5 +314,7 @@ def test_a_piece_of_the_ceiling_in_a_bore_of_the_part_is_warned_of(tmp_path: Pat
     assert said.endswith("or change chamber.height_mm")
     higher = design.changed({"chamber.height_mm": 80.0})
     assert not texts_of(WarningKind.WALL_IN_HOLE, higher, build_chamber(higher))
+    large = design.changed({"shot.diameter_mm": 14.0, "shot.mass_g": 100.0})
+    assert not texts_of(WarningKind.WALL_IN_HOLE, large, build_chamber(large))
     told = design.model_copy(update={"to_settle": (f"{MatterKind.HOLE}, not plugged",)})
     assert not texts_of(WarningKind.WALL_IN_HOLE, told, build_chamber(told))
