@@ -22,6 +22,7 @@ from chamberopt.chamber.layout.target import (
     area_in_mm2,
     find_surface,
     named_surfaces,
+    names_within,
     surfaces,
 )
 from chamberopt.chamber.part import chosen_on_part, chosen_triangles, named_surface, preview_part
@@ -83,9 +84,7 @@ def picked_answer(mesh: PartMesh, picked: Sequence[Picked]) -> bytes:
     known = _surfaces(mesh) if any(not one.name for one in picked) else ()
     area, rows, found = areas(mesh.vertices, mesh.triangles), [], {}
     for k, one in enumerate(picked):
-        same = (x.name for x in known if np.array_equal(x.triangles, one.triangles))
-        within = (f"one of {x.name}" for x in known if x.triangles[one.triangles].all())
-        name = one.name or next(same, "") or next(within, "a face")
+        name = one.name or _name_of(mesh, known, one.triangles)
         place = "" if one.at_mm is None else f"at {', '.join(plain(x, 4) for x in one.at_mm)} mm"
         size = area_in_mm2(float(area[one.triangles].sum()))
         rows.append({"name": name, "size": size, "place": place, "by_name": bool(one.name)})
@@ -96,16 +95,35 @@ def picked_answer(mesh: PartMesh, picked: Sequence[Picked]) -> bytes:
 def face_names(mesh: PartMesh, face: np.ndarray) -> dict[int, str]:
     """Return the names that the proposal gives to faces, by the number of each.
 
-    A face of several surfaces has the name of the first.
+    A face of several surfaces has the name of the first; one of several alike has its number too.
 
     Args:
         face: number of the face of each triangle, (m,).
     """
     names: dict[int, str] = {}
+    numbers, first = np.unique(face, return_index=True)
     for one in reversed(_surfaces(mesh)):
-        within = np.bincount(face, ~one.triangles) == 0
-        names |= {int(k): one.name for k in np.flatnonzero(within)}
+        within = np.bincount(face, ~one.triangles)[numbers] == 0
+        own = names_within(mesh, one, first[within].tolist())
+        names |= dict(zip(numbers[within].tolist(), own, strict=True))
     return names
+
+
+def _name_of(mesh: PartMesh, known: Sequence[Surface], picked: np.ndarray) -> str:
+    """Return the name of what is picked, as the proposal gives it, or "a face".
+
+    Args:
+        known: all surfaces of the part.
+        picked: marks its triangles, (m,) bool.
+    """
+    for one in known:
+        if np.array_equal(one.triangles, picked):
+            return f"{one.name}, all alike" if one.are_alike else one.name
+    for one in known:
+        if one.triangles[picked].all():
+            (name,) = names_within(mesh, one, [int(picked.argmax())])
+            return name if one.are_alike else f"one of {name}"
+    return "a face"
 
 
 @lru_cache(maxsize=2)

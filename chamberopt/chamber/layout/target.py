@@ -97,6 +97,11 @@ class Surface:
     raises_stress: bool = False  # whether such a form raises stress, as fillets and welds do
     beside_mm: float = 0.0  # what a target of it takes of the faces that go on from it
 
+    @property
+    def are_alike(self) -> bool:
+        """Whether it is several faces that are alike."""
+        return any(key.get("alike") for key in self.keys.get("faces", ()))
+
 
 @dataclass(frozen=True)
 class Target:
@@ -382,6 +387,19 @@ def _single(mesh: PartMesh, of: Surface, number: int) -> Surface | None:
     return Surface(
         f"{of.name}.{number}", {"faces": [key]}, marked, area_in_mm2(float(faces.area[face]))
     )
+
+
+def names_within(mesh: PartMesh, of: Surface, triangles: Sequence[int]) -> list[str]:
+    """Return the names of the faces of a surface in which some of its triangles are.
+
+    One of several faces that are alike has its number, such as "face 8.3".
+    """
+    faces = mesh.faces(crease_deg(mesh))
+    own = np.unique(faces.of_triangle[of.triangles])
+    if not of.are_alike:
+        return [of.name] * len(triangles)
+    numbers = np.searchsorted(own, faces.of_triangle[list(triangles)]) + 1
+    return [f"{of.name}.{number}" for number in numbers]
 
 
 def _way(normal: np.ndarray) -> str:

@@ -5,22 +5,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
-from chamberopt.chamber.layout.target import surfaces
+from chamberopt.chamber.layout.target import find_surface, surfaces
 from chamberopt.chamber.part import preview_part
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design
 from chamberopt.geometry.faces import Faces
+from chamberopt.geometry.meshes.part_mesh import read_part
 from chamberopt.geometry.triangles import unit_normals
 from chamberopt.page.answers import (
     check_answers,
     face_names,
     packed,
     part_answer,
+    picked_answer,
     shape_answer,
     step_texts,
     surface_answer,
 )
+from chamberopt.page.picking import Picked
 from tests.chamberopt.chamber.test_target import design_of
 
 
@@ -46,6 +50,25 @@ def test_faces_have_the_names_of_surfaces_that_hold_them(tmp_path: Path) -> None
     for k, name in names.items():
         own = faces.of_triangle == k
         assert name == next(one.name for one in surfaces(mesh) if one.triangles[own].all())
+
+
+def test_one_of_several_faces_alike_has_its_number(tmp_path: Path) -> None:
+    """Of a box of 10 x 20 x 30 mm without names, each face and its like are a surface."""
+    trimesh.creation.box((10, 20, 30)).export(tmp_path / "plain.stl")
+    mesh = read_part(tmp_path / "plain.stl", "mm")
+    faces = Faces(mesh.vertices, mesh.triangles, 30.0)
+    singles = [f"face {k}.{one}" for k in (1, 2, 3) for one in (1, 2)]
+    names = face_names(mesh, faces.of_triangle)
+    assert sorted(names.values()) == singles
+    known = surfaces(mesh)
+    whole = [Picked("", (0.0, 0.0, 0.0), one.triangles) for one in known]
+    each = [Picked("", (0.0, 0.0, 0.0), faces.of_triangle == k) for k in names]
+    answer = picked_answer(mesh, [*whole, *each])
+    head = json.loads(answer[4 : 4 + int.from_bytes(answer[:4], "little")])
+    alike = [f"{one.name}, all alike" for one in known]
+    assert [row["name"] for row in head["rows"]] == [*alike, *names.values()]
+    for name in singles:  # that --target takes
+        assert find_surface(mesh, known, name).triangles.sum() == 2
 
 
 def test_the_triangles_of_a_surface_are_those_of_its_name(tmp_path: Path) -> None:
