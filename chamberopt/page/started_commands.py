@@ -35,7 +35,9 @@ class StartedCommand:
         self._lines: list[str] = []
         self._answer: list[str] = []  # lines of JSON, of a command that was asked for JSON
         self._steps: dict[str, dict[str, Any]] = {}
-        self._stage: dict[str, int] | None = None  # number of the present one, and their count
+        # Number of the present one, names and count of all, and the times at which they began [s].
+        self._stage: dict[str, Any] | None = None
+        self._stages_began: dict[int, float] = {}
         self._draft: dict[str, Any] | None = None  # a proposal before its pilots
         self._held: dict[str, Any] = {}  # balls that are held in gaps as it simulates
         self._began = time.monotonic()
@@ -69,8 +71,9 @@ class StartedCommand:
         page, as its warnings are; `fault` are those where it failed, and `at` has what the last of
         them says of an option. `answer` is what a command that was asked for JSON has answered, or
         None. `draft` is a proposal before its pilots, while the command runs, and `stage` the
-        number of its present stage and the count of all. `held` tells of balls that are held in
-        gaps in a replica that runs now, if any: their count and a place.
+        number of its present stage, count and names of all, and when those so far `began` [s].
+        `held` tells of balls that are held in gaps in a replica that runs now, if any: their count
+        and a place.
         """
         code = self._process.poll()
         if code is not None:
@@ -91,7 +94,7 @@ class StartedCommand:
             "fault": printed if code else [],
             "at": at_keys(lines[-1]) if code and lines else {},
             "exit": code,
-            "stage": self._stage,
+            "stage": self._stage and {**self._stage, "began": self._stages_began},
             "draft": self._draft if code is None else None,
             "held": self._held if code is None and self._held.get("balls") else None,
             "answer": json.loads("".join(self._answer)) if self._answer and code == 0 else None,
@@ -129,6 +132,8 @@ class StartedCommand:
                 self._draft = told["draft"]
             elif "stage" in told:
                 self._stage = told["stage"]
+                now = time.monotonic() - self._began
+                self._stages_began[self._stage["number"]] = round(now, 1)
             elif "held" in told:
                 self._held = told["held"]
             elif told.get("ended"):

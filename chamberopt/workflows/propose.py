@@ -151,7 +151,7 @@ def stages(teller: Teller, pilot: bool) -> Iterator[Begin]:
         def begin(stage: str) -> None:
             now.close()
             number, count = order.index(stage) + 1, len(order)
-            tell_program("stage", lambda: {"number": number, "count": count})
+            tell_program("stage", lambda: {"number": number, "count": count, "names": order})
             now.enter_context(teller.step(f"step {number} of {count}: {stage}"))
 
         yield begin

@@ -169,7 +169,7 @@ function tell({ steps, stage: at, seconds, printed, warnings, fault, exit, pictu
   find("stop-line").hidden = exit !== null;
   find("busy").textContent = exit !== null ? "" : sinceBegin(seconds);
   const isStopped = exit === 130, atEnd = isStopped ? ["Stopped."] : [];
-  if (exit !== null || steps.length) find("progress").replaceChildren(...(exit === null ? stage(steps, at) : atEnd));
+  if (exit !== null || at || steps.length) find("progress").replaceChildren(...(exit === null ? stage(steps, at, seconds) : atEnd));
   find("warnings").replaceChildren(...warnings.map(warning));
   find("printed").replaceChildren(...asLines(printed));
   find("printed-fold").hidden = exit === null || !printed.length;

@@ -46,15 +46,36 @@ function forget(steps) {
   for (const step of begun.keys()) if (!steps.some((one) => one.step === step)) begun.delete(step);
 }
 
-// A command in stages as a line of its stage and what is being done of it, and a bar of the stages. Pilots of unlike lengths tell no time left.
-let farthest = 0; // of the bar, which never goes back
-export const stage = ([first, ...inner], at) => {
-  const counted = inner.length > 1 && inner[0].total ? inner[0].done / inner[0].total : 0;
-  if (at?.number === 1) farthest = 0;
-  farthest = Math.max(farthest, at ? at.number - 1 + counted : 0);
-  const words = inner.map(({ step, done, total }) => total ? `${step}: ${Math.floor(done)} of ${total}` : step).join(", ");
-  return [element("div", {}, words ? `${first.step} (${words})` : first.step, Object.assign(element("progress"), at ? { max: at.count, value: farthest } : {}))];
+// A command in stages as a list of them with what is being done, and a bar of their usual shares of the time.
+const SHARES = [3, 1, 3, 4, 2, 4, 1]; // of a proposal with pilots; measured, as what follows
+const TIMES = [4, 12]; // all stages over the first, which reads the part: a fillet of a bracket took 6 times, those of a shaft 11
+let farthest = 0, inner = []; // of the bar, which never goes back; steps that were seen within the stage
+export const stage = ([first, ...within], at, seconds) => {
+  if (!at) return first ? [element("div", {}, first.step, element("progress"))] : [];
+  if (inner.of !== at.number) {
+    if (at.number === 1) farthest = 0;
+    inner = Object.assign([], { of: at.number });
+  }
+  for (const { step } of within) if (!inner.includes(step)) inner.push(step);
+  const counted = within.find(({ total }) => total), share = (k) => at.count === SHARES.length ? SHARES[k] : 1;
+  const done = counted ? counted.done / counted.total : 1 - 0.7 ** inner.length;
+  const sum = (count) => Array.from({ length: count }, (_, k) => share(k)).reduce((a, b) => a + b, 0);
+  farthest = Math.max(farthest, sum(at.number - 1) + share(at.number - 1) * Math.min(done, 0.95));
+  const words = within.map(({ step, done: now, total }) => total ? `${step}: ${Math.floor(now)} of ${total}` : step).join(", ");
+  const took = (k) => at.began[k + 2] ? `, ${inWords(at.began[k + 2] - at.began[k + 1])}` : "";
+  const items = at.names.map((name, k) => element("li", { className: k + 1 < at.number ? "done" : k + 1 === at.number ? "now" : "" },
+    name, k + 1 < at.number ? took(k) : "", ...(k + 1 === at.number && words ? [element("small", { textContent: ` ${words}` })] : [])));
+  return [element("div", {}, element("progress", { max: sum(at.count), value: farthest }), left(at, seconds)), element("ol", { className: "stages" }, ...items)];
 };
+
+// The time that is left by how long the first stage took.
+function left({ count, began }, seconds) {
+  if (count !== SHARES.length) return "";
+  if (!began[2]) return " how long it takes is told once the part is read";
+  const [least, most] = TIMES.map((times) => times * began[2] - seconds);
+  if (most <= 0) return "";
+  return least < 10 ? ` less than ${inWords(most)} left, usually` : ` ${inWords(least)} to ${inWords(most)} left, usually`;
+}
 
 export const bars = (steps) => {
   forget(steps);

@@ -169,7 +169,10 @@ def test_a_draft_is_told_before_the_pilots(front: Served, tmp_path: Path) -> Non
     assert now["answer"] is None
     rows = {row["name"]: row["value"] for row in now["proposal"]["rows"]}
     assert "height" in rows["chamber"][0]
-    assert 1 <= now["stage"]["number"] <= now["stage"]["count"] == 7
+    stage = now["stage"]
+    assert 1 <= stage["number"] <= stage["count"] == len(stage["names"]) == 7
+    assert stage["names"][0] == "reading the part and choosing sizes"
+    assert sorted(map(int, stage["began"])) == [*range(1, stage["number"] + 1)]
     assert not any("draft" in line or "stage" in line for line in now["lines"])
     assert b'"shape_mm"' in front.ask("/chamber", {})
     assert b'"unpeened"' in front.ask("/chamber", {"exact": True})
