@@ -20,6 +20,7 @@ from chamberopt.chamber.checks.warning import UNPEENED, DesignWarning, WarningKi
 from chamberopt.chamber.layout.target import (
     Surface,
     area_in_mm2,
+    crease_deg,
     find_surface,
     named_surfaces,
     names_within,
@@ -36,6 +37,7 @@ from chamberopt.design.sonotrode import Face
 from chamberopt.documents.facts import facts_in_words
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.sight import way_to_see
+from chamberopt.geometry.smoothing.fillets import fillets_of
 from chamberopt.geometry.triangles import areas, border_edges, sharp_edges
 from chamberopt.page.page_words import Words, on_page
 from chamberopt.page.picking import Picked
@@ -74,6 +76,21 @@ def surface_answer(mesh: PartMesh, name: str) -> bytes:
     known = () if name in mesh.groups else _surfaces(mesh)  # faces take longer to find
     found = np.flatnonzero(find_surface(mesh, known, name).triangles)
     return packed({}, triangles=found)
+
+
+def surfaces_answer(mesh: PartMesh) -> bytes:
+    """Return what of a part can be chosen as the target, by a name or by a click on it.
+
+    `rows` are the names with their sizes in words. `face` is the number of the face of each
+    triangle, and `names` has the name that a click on a face means. A fillet is a face of its own.
+    """
+    face = mesh.numbering.cad_face
+    if face is None:
+        creased = mesh.faces(crease_deg(mesh)).of_triangle
+        both = np.stack([creased, fillets_of(mesh).of_triangle], axis=1)
+        face = np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
+    rows = [[one.name, one.text] for one in _surfaces(mesh)]
+    return packed({"rows": rows, "names": face_names(mesh, face)}, face=face)
 
 
 def picked_answer(mesh: PartMesh, picked: Sequence[Picked]) -> bytes:

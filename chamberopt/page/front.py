@@ -29,7 +29,13 @@ from chamberopt.geometry.meshes.part_mesh import PartMesh, keep_part, read_part_
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import METRES_PER, STATED, UnknownUnitError
 from chamberopt.page.acts import Acts, free_folder, path_inside
-from chamberopt.page.answers import check_answers, part_answer, shape_answer, surface_answer
+from chamberopt.page.answers import (
+    check_answers,
+    part_answer,
+    shape_answer,
+    surface_answer,
+    surfaces_answer,
+)
 from chamberopt.page.edited_file import alloy_suggestions
 from chamberopt.page.page_words import balls_named, choices, on_page
 from chamberopt.page.started_commands import JSON, OneCommand
@@ -168,6 +174,10 @@ class Front:
     def face(self, asked: Any) -> bytes:
         """Return which triangles of a part are its surface of a name."""
         return surface_answer(self._part_of_any_unit(asked), str(asked["name"]))
+
+    def surfaces(self, asked: Any) -> bytes:
+        """Return what of a part can be peened, by name or by a click: it takes longer to find."""
+        return surfaces_answer(self._part_of_any_unit(asked))
 
     def _part(self, asked: Any) -> PartMesh:
         """Return a part of the folder.

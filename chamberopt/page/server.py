@@ -130,7 +130,18 @@ BROWSER = Path(__file__).parent / "browser"
 FILE_POLICY = "sandbox allow-scripts allow-modals allow-popups allow-downloads"
 SHOWN_FILES = {".html": "text/html", ".pdf": "application/pdf", ".png": "image/png"}
 # Names of requests to the front page and to that of a design; looks take no question, by GET.
-OF_FRONT = "example", "look", "view", "face", "chamber", "propose", "open", "close", "stop"
+OF_FRONT = (
+    "example",
+    "look",
+    "view",
+    "face",
+    "surfaces",
+    "chamber",
+    "propose",
+    "open",
+    "close",
+    "stop",
+)
 LOOKS_OF_FRONT = "front", "status"
 OF_DESIGN = (
     "read", "part", "surface", "fields", "structure", "step", "remove", "shape", "cavity", "reach",

@@ -107,6 +107,42 @@ async function drawCavity(isDraft) {
 view.renderer.domElement.addEventListener("dblclick", () => { if (view.home) view.look(view.home); });
 const shows = (named, name) => lights(named, view, () => ask("/face", { part: known.part, unit: known.unit, name }), () => pointed);
 
+// What can be peened, ticked by name or by clicks on faces of the part; what is ticked is lit, until a chamber shows its target.
+let choosable = null; // number of each triangle's face, and the names of faces
+const MOST_LISTED = 12; // names that the file has not; a click takes others
+function box(name, text) {
+  const there = ticked().find((one) => one.value === name);
+  if (there) return there;
+  const made = element("input", { type: "checkbox", value: name });
+  made.addEventListener("change", () => attempt(lightTicked));
+  find("names").append(shows(element("label", {}, made, ` ${name}${text ? `: ${text}` : ""}`), name));
+  find("names").hidden = false;
+  return made;
+}
+async function findSurfaces(part, unit) {
+  choosable = null;
+  const told = unpack(await ask("/surfaces", { part, unit }));
+  if (known.part !== part || known.unit !== unit) return;
+  choosable = told;
+  const named = new Set(ticked().map((one) => one.value));
+  for (const [name, text] of told.rows.filter(([one]) => !named.has(one)).slice(0, MOST_LISTED)) box(name, text);
+  document.body.dataset.choosable = part;
+}
+const lit = new Map(); // triangles by part and name
+async function lightTicked() {
+  const names = ticked().filter((one) => one.checked).map((one) => one.value), key = (name) => `${known.part} ${name}`;
+  for (const name of names) if (!lit.has(key(name))) lit.set(key(name), unpack(await ask("/face", { ...known, name })).triangles);
+  if (!view.get("walls")) view.highlight("part", names.length ? names.flatMap((name) => [...lit.get(key(name))]) : null, pointed);
+}
+find("names").addEventListener("pointerleave", () => { if (ticked().some((one) => one.checked)) attempt(lightTicked); });
+view.hearClicks((event) => attempt(async () => {
+  const hit = choosable && !view.get("walls") ? view.at(event, ["part"]) : null, name = hit && choosable.names[choosable.face[hit.triangle]];
+  if (!name) return;
+  const one = box(name);
+  one.checked = !one.checked;
+  await lightTicked();
+}));
+
 // Read a part, to say its size, and to ask for its unit where the file states none.
 async function look(part, unit = "") {
   if (part !== known.part) find("sizes").hidden = true;
@@ -127,12 +163,13 @@ async function look(part, unit = "") {
     }));
     for (const button of find("sizes").querySelectorAll("button")) button.ariaPressed = String(button.value === unit);
     find("names").hidden = !seen.names.length;
-    find("names").replaceChildren(find("names").firstElementChild, ...seen.names.map(([name, text]) =>
-      shows(element("label", {}, element("input", { type: "checkbox", value: name }), ` ${name}: ${text}`), name)));
+    find("names").replaceChildren(find("names").firstElementChild);
+    for (const [name, text] of seen.names) box(name, text);
     find("known").textContent = sizes.length ? "" : `${part} measures ${seen.size}.`;
     find("propose").disabled = sizes.length > 0;
     document.body.dataset.known = sizes.length ? "sizes" : "all";
     await draw(part);
+    if (!sizes.length) attempt(() => findSurfaces(part, unit));
   } catch (error) {
     find("known").textContent = "";
     throw error;
@@ -269,6 +306,7 @@ async function propose(target) {
   const begun = await started(target);
   if (!begun) return;
   proposed = target;
+  for (const name of target) box(name);
   for (const one of ticked()) one.checked = target.includes(one.value);
   find("made").hidden = false;
   find("made").scrollIntoView({ behavior: "smooth" });
@@ -296,6 +334,7 @@ attempt(async () => {
   await attempt(() => look(chosen, unit));
   proposed = target;
   for (const id of WISHES) if (wishes[id]) find(id).value = wishes[id];
+  for (const name of target) box(name);
   for (const one of ticked()) one.checked = target.includes(one.value);
   document.body.dataset.ready = "yes";
   if (now.asked) await follow(now);

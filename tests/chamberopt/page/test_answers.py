@@ -23,9 +23,12 @@ from chamberopt.page.answers import (
     shape_answer,
     step_texts,
     surface_answer,
+    surfaces_answer,
 )
 from chamberopt.page.picking import Picked
 from tests.chamberopt.chamber.test_target import design_of
+
+FIR_TREE = Path(__file__).resolve().parents[3] / "designs/parts/fir_tree.step"
 
 
 def test_each_triangle_has_the_number_of_its_name(tmp_path: Path) -> None:
@@ -69,6 +72,18 @@ def test_one_of_several_faces_alike_has_its_number(tmp_path: Path) -> None:
     assert [row["name"] for row in head["rows"]] == [*alike, *names.values()]
     for name in singles:  # that --target takes
         assert find_surface(mesh, known, name).triangles.sum() == 2
+
+
+def test_a_click_on_each_face_means_a_surface_that_can_be_peened(tmp_path: Path) -> None:
+    """Also the fillet of a step, and each face of a box."""
+    trimesh.creation.box((10, 20, 30)).export(tmp_path / "plain.stl")
+    for mesh in (read_part(tmp_path / "plain.stl", "mm"), read_part(FIR_TREE, "stated")):
+        answer = surfaces_answer(mesh)
+        head = json.loads(answer[4 : 4 + int.from_bytes(answer[:4], "little")])
+        assert [row[0] for row in head["rows"]] == [one.name for one in surfaces(mesh)]
+        assert head["arrays"]["face"][1] == len(mesh.triangles)
+        for name in set(head["names"].values()):
+            assert find_surface(mesh, surfaces(mesh), name).triangles.any()
 
 
 def test_the_triangles_of_a_surface_are_those_of_its_name(tmp_path: Path) -> None:

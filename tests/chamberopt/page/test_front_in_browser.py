@@ -52,6 +52,16 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             expect(page.locator("#sizes [aria-pressed=true]")).to_contain_text("in mm)")
             opened.wait("data-known=all")
             expect(page.locator("#known")).to_contain_text("my part.stl measures 16 x 16 x 16 mm")
+            opened.wait("data-choosable='my part.stl'")
+            page.locator("#view").click()  # a face of the part, before anything is proposed
+            picked = page.locator("#names input:checked")
+            expect(picked).to_have_value(re.compile(r"face 1\.[1-6]"))
+            expect(page.locator("#view")).to_have_attribute("data-highlight", "2")  # triangles
+            page.check("#names input[value='face 1']")
+            expect(page.locator("#view")).to_have_attribute("data-highlight", "14")
+            page.uncheck("#names input[value='face 1']")
+            page.locator("#view").click()
+            expect(picked).to_have_count(0)
             box = page.locator("#propose").bounding_box()
             assert box["y"] + box["height"] < 800  # all that is needed is on the first screen
             page.click("#more summary")
