@@ -48,7 +48,7 @@ function forget(steps) {
 
 // A command in stages as a list of them with what is being done, and a bar of their usual shares of the time.
 const SHARES = [3, 1, 3, 4, 2, 4, 1]; // of a proposal with pilots; measured, as what follows
-const TIMES = [4, 12]; // all stages over the first, which reads the part: a fillet of a bracket took 6 times, those of a shaft 11
+const TIMES = [4, 15]; // all stages over the first, which reads the part: a fillet of a bracket took 6 times, those of a shaft 14
 let farthest = 0, inner = []; // of the bar, which never goes back; steps that were seen within the stage
 export const stage = ([first, ...within], at, seconds) => {
   if (!at) return first ? [element("div", {}, first.step, element("progress"))] : [];
@@ -62,7 +62,10 @@ export const stage = ([first, ...within], at, seconds) => {
   const sum = (count) => Array.from({ length: count }, (_, k) => share(k)).reduce((a, b) => a + b, 0);
   farthest = Math.max(farthest, sum(at.number - 1) + share(at.number - 1) * Math.min(done, 0.95));
   const words = within.map(({ step, done: now, total }) => total ? `${step}: ${Math.floor(now)} of ${total}` : step).join(", ");
-  const took = (k) => at.began[k + 2] ? `, ${inWords(at.began[k + 2] - at.began[k + 1])}` : "";
+  const took = (k) => { // stages may be skipped
+    const next = Math.min(...Object.keys(at.began).map(Number).filter((number) => number > k + 1));
+    return k + 1 in at.began ? `, ${inWords(at.began[next] - at.began[k + 1])}` : ", not needed";
+  };
   const items = at.names.map((name, k) => element("li", { className: k + 1 < at.number ? "done" : k + 1 === at.number ? "now" : "" },
     name, k + 1 < at.number ? took(k) : "", ...(k + 1 === at.number && words ? [element("small", { textContent: ` ${words}` })] : [])));
   return [element("div", {}, element("progress", { max: sum(at.count), value: farthest }), left(at, seconds)), element("ol", { className: "stages" }, ...items)];

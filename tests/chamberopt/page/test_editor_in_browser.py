@@ -189,12 +189,14 @@ def test_a_young_run_tells_the_time_that_is_left(opened: Page) -> None:
 def test_a_proposal_moves_from_its_start_and_tells_the_time_once_the_part_is_read(
     opened: Page,
 ) -> None:
-    """Three looks in its first stage of seven, which ends after 20 s, and one in the third."""
+    """Three looks in its first stage of seven, which ends after 20 s, and one in the fourth."""
     told = """async (looks) => {
       const { stage } = await import("/browser/steps.js");
       return looks.map(([steps, at, seconds]) => {
         const [head, list] = stage(steps, at, seconds), now = list.querySelector(".now");
-        return [head.querySelector("progress").value, head.textContent.trim(), now.textContent];
+        const ended = [...list.querySelectorAll(".done")].map((one) => one.textContent);
+        const { value } = head.querySelector("progress");
+        return [value, head.textContent.trim(), now.textContent, ended];
       });
     }"""
     names = ["reading", "drawing", "simulating", "trying", "choosing", "further", "writing"]
@@ -207,17 +209,20 @@ def test_a_proposal_moves_from_its_start_and_tells_the_time_once_the_part_is_rea
         [*look(1, {1: 1}, "the file"), 2],
         [*look(1, {1: 1}, "faces"), 9],
         [*look(1, {1: 1}, "faces"), 10],
-        [*look(3, {1: 1, 2: 20, 3: 24}, "pilot run"), 30],
+        [*look(4, {1: 1, 2: 20, 4: 24}, "pilot run"), 30],
     ]
     rows = opened.page.evaluate(told, looks)
-    values = [value for value, _, _ in rows]
-    assert 0 < values[0] < values[1] == values[2] < 3 < 4 < values[3] < 7
+    values = [one[0] for one in rows]
+    assert 0 < values[0] < values[1] == values[2] < 3 < 7 < values[3] < 11
     assert [one[1] for one in rows] == [
         *["how long it takes is told once the part is read"] * 3,
-        "50 s to 4 min left, usually",
+        "50 s to 5 min left, usually",
     ]
     assert [one[2] for one in rows] == [*("reading the file", *["reading faces"] * 2), rows[3][2]]
-    assert rows[3][2] == "simulating pilot run"
+    assert rows[3][2:] == [
+        "trying pilot run",
+        ["reading, 20 s", "drawing, 5 s", "simulating, not needed"],
+    ]
 
 
 def test_a_chamber_is_first_seen_open_round_its_whole_part(opened: Page) -> None:
