@@ -36,6 +36,7 @@ from chamberopt.chamber.propose.proposal import (
 )
 from chamberopt.chamber.propose.proposed_mask import (
     are_holes,
+    open_bores,
     pads,
     rows_of,
     to_be_masked,
@@ -175,9 +176,10 @@ def padded(
 def masked(bare: Proposal, floor: Floor, bores: Sequence[Bore], shop: Shop | None) -> Proposal:
     """Return a proposal with a mask on what must not be peened, where that does no harm.
 
-    Holes are plugged, also those that a wall crosses and through which balls would leave. What runs
-    in another part gets a sleeve that ends before the target. Where a mask would do harm, the
-    surfaces stay bare and are named.
+    Holes are plugged, also those that a wall crosses and through which balls would leave. So are
+    bores that are open to the shot, as what fits in them keeps its size. What runs in another part
+    gets a sleeve that ends before the target. Where a mask would do harm, the surfaces stay bare
+    and are named.
 
     Args:
         bores: round holes of the part, also those that do not go through.
@@ -186,24 +188,23 @@ def masked(bare: Proposal, floor: Floor, bores: Sequence[Bore], shop: Shop | Non
     holes = to_be_plugged(bare.design, bare.chamber, bores, fits)
     if "mask" in bare.tables or bare.design.effects.part_turn is not None:
         return bare
-    if holes and are_holes(bare.mesh, bare.known, fits, holes):
-        counts = Counter(f"{2e3 * one.radius:.3g}" for one in holes)
-        sizes = ", ".join(f"{k} x {size}" if k > 1 else size for size, k in counts.items())
-        named = "not to be peened, or " if fits else ""
-        what = "plugs in holes" if len(holes) > 1 else "a plug in the hole"
-        text = (
-            f"{what} of {sizes} mm, {named}which the wall crosses: from the rims up to the wall, "
-            "so that no ball leaves there"
-        )
-        keys: dict[str, Any] = {"plugs": True, "at": {"faces": [one.wall for one in holes]}}
-    elif runs:
+    is_of_holes = bool(holes) and are_holes(bare.mesh, bare.known, fits, holes)
+    if is_of_holes or not (fits or runs):
+        known = {one.at_mm for one in holes}
+        opened = open_bores(bare.design, bare.chamber, bores)
+        opened = [one for one in opened if one.at_mm not in known]
+        if opened and (plugged := _plugged(bare, floor, shop, holes, opened, fits)):
+            return plugged
+    if is_of_holes:
+        return _plugged(bare, floor, shop, holes, [], fits) or bare
+    if runs:
         margin = 0.5 * math.ceil(2e3 * CLEAR * max(bare.design.shot.diameters))
         text = (
             f"a sleeve on {', '.join(runs + fits)}: runs or fits, by the name; it ends {margin:g} "
             "mm before the target, so that balls get to its border; in halves where it cannot be "
             "slid on"
         )
-        keys = {"margin_mm": margin, "thickness_mm": USUAL_SHELL_MM}
+        keys: dict[str, Any] = {"margin_mm": margin, "thickness_mm": USUAL_SHELL_MM}
         keys["at"] = {"surface": runs + fits}
     elif fits or holes:
         text = f"a cap on {', '.join(fits)}: not to be peened, by the name"
@@ -212,6 +213,46 @@ def masked(bare: Proposal, floor: Floor, bores: Sequence[Bore], shop: Shop | Non
         return bare
     reasons = {**bare.reasons, f"mask.{next(iter(keys))}": text}
     return _harmless(_with_mask(bare.tables, keys), reasons, floor, bare, shop)[0] or bare
+
+
+def _plugged(
+    bare: Proposal,
+    floor: Floor,
+    shop: Shop | None,
+    holes: Sequence[Bore],
+    opened: Sequence[Bore],
+    fits: Sequence[str],
+) -> Proposal | None:
+    """Return a proposal with plugs in holes; None where they do harm.
+
+    Args:
+        holes: those that must not be peened by their names, or that a wall crosses.
+        opened: further ones, which are open to the shot.
+        fits: these names.
+    """
+    words = []
+    if holes:
+        named = "not to be peened, or " if fits else ""
+        words.append(
+            f"{_of_sizes(holes)}, {named}which the wall crosses: from the rims up to the wall, so "
+            "that no ball leaves there"
+        )
+    if opened:
+        words.append(
+            f"{_of_sizes(opened)}, open to the shot and not to be peened: flush with the rims, so "
+            "that what takes a pin or a screw keeps its size (leave the mask out where that does "
+            "not matter)"
+        )
+    keys = {"plugs": True, "at": {"faces": [one.wall for one in (*holes, *opened)]}}
+    reasons = {**bare.reasons, "mask.plugs": "; ".join(words)}
+    return _harmless(_with_mask(bare.tables, keys), reasons, floor, bare, shop)[0]
+
+
+def _of_sizes(holes: Sequence[Bore]) -> str:
+    """Return in words how many plugs holes get, and of what diameters."""
+    counts = Counter(f"{2e3 * one.radius:.3g}" for one in holes)
+    sizes = ", ".join(f"{k} x {size}" if k > 1 else size for size, k in counts.items())
+    return f"{'plugs in holes' if len(holes) > 1 else 'a plug in the hole'} of {sizes} mm"
 
 
 def only_touched(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:

@@ -54,6 +54,7 @@ AWAY_DEG = 105.0  # angle to the way down from which on a face is turned away fr
 LEAST = 0.02  # share of the target's area below which nothing is offered
 NEARLY_ALL, MOST_NAMED = 0.9, 3
 KINDS = ("surface", "faces")  # keys of a target that choose surfaces
+MOST_PLUGS = 16  # bores that are plugged because they are open to the shot
 MOST_LOOKED_AT = 20  # surfaces, the largest
 # Share of the target's area from which on what is met of a surface is named, though most of it lies
 # outside of the chamber.
@@ -117,6 +118,17 @@ def to_be_plugged(
         if is_named or at_wall[rows].any():
             found.append(bore)
     return found
+
+
+def open_bores(design: Design, chamber: Chamber, bores: Sequence[Bore]) -> list[Bore]:
+    """Return the bores that balls get into, the widest first; none of many, as of a sieve."""
+    area = touched(design, chamber) * chamber.exposed_area
+    found = []
+    for bore in bores:
+        rows = rows_of(design, {"faces": [bore.wall]})
+        if area[rows].sum() > MET * chamber.part.area[rows].sum():
+            found.append(bore)
+    return found if len(found) <= MOST_PLUGS else []
 
 
 def open_holes(proposal: Proposal) -> str:

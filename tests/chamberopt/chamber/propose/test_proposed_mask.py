@@ -172,6 +172,20 @@ def test_a_bore_out_through_the_ceiling_is_plugged(tmp_path: Path) -> None:
     assert told.endswith("as by a pin of 12 mm in it, up to the ceiling")
 
 
+def test_a_pin_bore_that_is_open_to_the_shot_is_plugged(tmp_path: Path) -> None:
+    """A lug without names, of which a broad side is peened, with a bore wider than the balls."""
+    lug = trimesh.creation.box((30.0, 12.0, 50.0))
+    bore = trimesh.creation.cylinder(7.0, 20.0, sections=48)
+    bore.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2.0, (1, 0, 0)))
+    bore.apply_translation((0, 0, -10.0))
+    trimesh.boolean.difference([lug, bore], engine="manifold").export(tmp_path / "lug.stl")
+    made = propose(tmp_path / "lug.stl", Wanted("mm", ball_mm=2.0), lambda _: ["face 1"])
+    assert made.design.mask is not None
+    assert made.design.mask.plugs
+    assert made.reasons["mask.plugs"].startswith("a plug in the hole of 14 mm, open to the shot")
+    assert made.chamber.fixtures["mask"].covered_target == 0.0
+
+
 def test_the_face_that_goes_on_beside_a_fillet_is_met(monkeypatch: pytest.MonkeyPatch) -> None:
     """A stud, of whose smooth side the fillet is a face of the CAD file, in a room round it."""
     angle = np.radians(np.arange(0.0, 91.0, 10.0))
