@@ -309,8 +309,16 @@ def _best_of(free: Sequence[SizeFit], fits: Sequence[SizeFit]) -> tuple[SizeFit,
     else:
         best = as_good
         shown = sorted({*fits[:: max(1, len(fits) // MOST_LISTED)], best}, key=lambda x: x.diameter)
-        shares = ", ".join(f"{_mm(one)} {one.served:.0%}" for one in shown)
-        text = f"{MatterKind.NO_SIZE} (fillets of 2, slots of 4 diameters); of the target: {shares}"
+        shares = ", ".join(
+            f"{1.0 - one.served:.0%} by balls of {_mm(one)}{' (taken)' if one is best else ''}"
+            for one in shown
+        )
+        text = (
+            f"{MatterKind.NO_SIZE} of the target. Missed are {shares}: these places are out of "
+            f"reach, or in fillets of less than {1 / OF_FILLET:g} diameters' radius or slots of "
+            f"less than {1 / OF_SLOT:g} diameters, which are peened slowly. Agree on them, or "
+            "leave them out of the target"
+        )
     return best, text
 
 
