@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ from chamberopt.chamber.layout.arbor import Bore
 from chamberopt.chamber.layout.end import HeldEnd
 from chamberopt.chamber.layout.floor import Floor
 from chamberopt.chamber.layout.grip import thin_grip
-from chamberopt.chamber.layout.holder import end_holder, holder_choices
+from chamberopt.chamber.layout.holder import HolderChoice, end_holder, holder_choices
 from chamberopt.chamber.layout.sizes import LONG
 from chamberopt.chamber.layout.target import CREASE_DEG, Target
 from chamberopt.chamber.matters import MatterKind
@@ -102,12 +103,32 @@ def held(
         if one.pins:
             tables = _with_mask(tables, {"plugs": True, "at": {"faces": list(one.pins)}})
             reasons["mask.plugs"] = "the pins that hold it fill these holes, flush with their rims"
-        made, harm = _harmless(tables, reasons, floor, free, shop, one.keys["kind"], hidden)
+        made, harm = _harmless(tables, reasons, floor, free, shop, hidden)
         if made is not None:
             return made
-        why = why or harm
+        why = why or _not_held(one, harm, len(choices))
     text = f"sonotrode to ceiling; {MatterKind.NOTHING_HOLDS}: {why}"
     return replace(free, reasons={**free.reasons, "chamber.height_mm": text})
+
+
+def _not_held(one: HolderChoice, harm: str, tried: int) -> str:
+    """Return in words why the best holder is not taken, and what to do.
+
+    Args:
+        harm: that it does.
+        tried: number of holders that were tried, none of which is taken.
+    """
+    kind = one.keys["kind"]
+    what = f"{'an' if kind == 'arbor' else 'a'} {kind}"
+    on = one.reason.partition("; ")[0].removeprefix(f"{what} ")
+    others = f", and {tried - 1} further ways to hold it do harm too" if tried > 1 else ""
+    comma = "," if "," in on else ""
+    keys = ", ".join(f"{key} = {json.dumps(value)}" for key, value in one.keys.items() if key != "at")
+    return (
+        f"{what} {on}{comma} was tried, but then {harm.partition('; ')[0]}{others}. Take another pose (--pose) or a target "
+        "that leaves another place free (--target), or accept it and write the holder into the "
+        f"design ([holder] {keys}, at these faces)"
+    )
 
 
 def _is_same(keys: dict[str, Any], others: dict[str, Any]) -> bool:
@@ -384,7 +405,6 @@ def _harmless(
     floor: Floor,
     before: Proposal,
     shop: Shop | None,
-    kind: str = "mask",
     hidden: float = HIDDEN,
 ) -> tuple[Proposal | None, str]:
     """Return a proposal with these tables in the place of one's own, or None and the harm they do.
@@ -393,7 +413,6 @@ def _harmless(
     bring a warning, or if they keep the balls from some of the target.
 
     Args:
-        kind: what the tables add, for the words.
         hidden: share of the target that they may keep from the balls.
     """
     try:
@@ -402,13 +421,13 @@ def _harmless(
     except UnreadableError:
         raise
     except HarmError as error:
-        return None, f"with the {kind}: {error.warning.beginning}"
+        return None, error.warning.beginning
     except InputError as error:
         return None, str(error)
-    if touched_share(before) - touched_share(made) > hidden:
-        return None, "a holder would keep the balls from some of the target"
+    if (kept := touched_share(before) - touched_share(made)) > hidden:
+        return None, f"the balls do not get to {kept:.1%} of the target"
     if harm := new_harm(made, before):
-        return None, f"with the {kind}: {harm.beginning}"
+        return None, harm.beginning
     return made, ""
 
 

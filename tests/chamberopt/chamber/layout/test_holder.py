@@ -14,7 +14,7 @@ from chamberopt.chamber.layout.holder import NOT_FIXED, HolderChoice, end_holder
 from chamberopt.chamber.layout.target import WHOLE, Surface, Target, apart
 from chamberopt.chamber.propose import first_design
 from chamberopt.chamber.propose.first_design import propose
-from chamberopt.chamber.propose.held_proposal import is_firm, is_held_thinly
+from chamberopt.chamber.propose.held_proposal import _not_held, is_firm, is_held_thinly
 from chamberopt.chamber.propose.proposal import Proposal, Wanted
 from chamberopt.chamber.propose.proposed_mask import find_left_out
 from chamberopt.chamber.propose.text import clauses, design_text
@@ -154,6 +154,18 @@ def test_where_nothing_can_hold_the_part_the_reason_is_said(tmp_path: Path) -> N
         "hold it by"
     )
     assert any("held in the air" in note for note in made.chamber.notes)
+
+
+def test_a_holder_that_does_harm_is_told_with_what_to_do() -> None:
+    keys = {"kind": "arbor", "at": {"faces": []}, "axis": [1.0, 0.0, 0.0], "both_sides": True}
+    one = HolderChoice(keys, "an arbor through the bore of 16 mm, which is not peened; flanges lie")
+    told = _not_held(one, "balls can come to rest on the holder", 3)
+    assert told.startswith(
+        "an arbor through the bore of 16 mm, which is not peened, was tried, but then balls can "
+        "come to rest on the holder, and 2 further ways to hold it do harm too. Take another pose"
+    )
+    keys_in_words = 'kind = "arbor", axis = [1.0, 0.0, 0.0], both_sides = true, at these faces'
+    assert f"([holder] {keys_in_words})" in told
 
 
 def test_a_thin_plate_is_held_by_a_block_on_its_end() -> None:
