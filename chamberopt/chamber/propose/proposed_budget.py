@@ -27,6 +27,9 @@ COLLISIONS = 2e7
 MINUTES = 6.0
 LEAST_TIME, MOST_TIME = 0.1, 1000.0  # s, of each replica
 LEAST_WARMUP = 0.2  # s: balls cross the chamber some times
+# Warm-up over the time after which a pilot no longer tells that the shot slows down: a simulation,
+# which is longer, resolves less.
+LONGER_WARMUP = 1.5
 ROUND = (1, 1.5, 2, 3, 5, 7)  # numbers that times and windows are rounded to
 MODEST_GB = 2.0  # that what is proposed takes, with its process, whatever the machine has
 OF_MEMORY = f"{MODEST_GB:g} GB of memory"
@@ -159,7 +162,7 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
         "process.treatment_time_s": _said_of_treatment(found, treatment, coverage_percent),
         "process.accuracy.simulated_time_s": expected + (few if dents * gauge < needed else ""),
     }
-    warmup = _rounded_up(max(LEAST_WARMUP, found.warmup))
+    warmup = _rounded_up(max(LEAST_WARMUP, LONGER_WARMUP * found.warmup))
     if not found.settled:
         reasons["process.accuracy.warmup_time_s"] = UNSETTLED
     elif warmup > LEAST_WARMUP:

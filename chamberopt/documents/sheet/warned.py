@@ -98,6 +98,7 @@ def cautions(result: Result) -> Iterator[str]:
     The warnings say how the simulation differs from the machine, and which goals are not reached.
     """
     yield from (one.text for one in time_lines(result)[1:])
+    yield from (one.text for one in shot_lines(result) if not one.warns)
     if result.design.effects.friction is None:
         yield (
             "Simulated without friction, as asked. With it the shot was 22 to 47 % slower in a "

@@ -35,6 +35,7 @@ from chamberopt.documents.sheet import (
     REQUALIFY,
     AsBuilt,
     alarms,
+    cautions,
     chamber_limits,
     first_checks,
     limit_tables,
@@ -657,6 +658,10 @@ def test_what_forbids_to_use_it_is_in_red(folder: Path) -> None:
     lively = result.record.model_copy(update={"first_half_excess": 0.12})
     (told,) = [text for text in alarms(replace(result, record=lively)) if "not settled" in text]
     assert "dented by 12 % more in the first half" in told
+    nearly = replace(result, record=result.record.model_copy(update={"first_half_excess": 0.03}))
+    assert not any("settled" in text for text in alarms(nearly))
+    (told,) = [text for text in cautions(nearly) if "settled" in text]
+    assert told.endswith("So times are about 1.5 % longer than told.")
     for few, words in ((1, "1 matter is to"), (2, "2 matters are to")):
         open_one = result.design.changed({"to_settle": ["NOT MASKED: ask"] * few})
         (told,) = [text for text in alarms(replace(result, design=open_one)) if "matter" in text]
