@@ -15,6 +15,7 @@ import numpy as np
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import touched
+from chamberopt.chamber.checks.jams import JAM_BAND
 from chamberopt.chamber.checks.openings import (
     Opening,
     find_openings,
@@ -138,8 +139,11 @@ def open_holes(proposal: Proposal) -> str:
         told = np.zeros(len(room.part.triangles), dtype=bool)
         for hole in find_walls_in_holes(room):
             told[hole.beside] = True
-            place = around(np.array([hole.opening.place]))
-            words.append((hole.size_in_words, hole.opening.wall, place))
+            opening = hole.opening
+            if min(opening.size) < JAM_BAND[0] * min(design.ball_diameters):
+                continue  # no ball gets into it
+            place = around(np.array([opening.place]))
+            words.append((hole.size_in_words, opening.wall, place))
         at_wall = part_at_wall(room)
         if not at_wall.any():
             continue
@@ -157,7 +161,9 @@ def open_holes(proposal: Proposal) -> str:
     listed = [f"{size} in {wall} at {place}" for size, wall, place in words[:MOST_NAMED]]
     more = f" and {len(words) - MOST_NAMED} more" if len(words) > MOST_NAMED else ""
     several = len(words) > 1
-    pin = "pins as wide in them" if several else f"a pin of {words[0][0]} in it"
+    is_round = not any(" x " in size for size, _, _ in words)
+    filler = "pin" if is_round else "filler"
+    pin = f"{filler}s as wide in them" if several else f"a {filler} of {words[0][0]} in it"
     wall = "the wall" if several else words[0][1]
     return (
         f"{MatterKind.HOLES if several else MatterKind.HOLE}, not plugged: the part's, of "
