@@ -196,10 +196,8 @@ def measure_budget(
     else:
         intensity = PredictedIntensity.of(wide.metrics, design.calibration)
     mean_time = slow.process.treatment_time / mean
-    usual = design.changed({"process.accuracy.gauge_mm2": 1.0})
-    counts = FEWEST, max(FEWEST, design.process.accuracy.max_replicas)
     return Measured(
-        room=min(time_within(1e9 * MODEST_GB, usual, chamber, count) for count in counts),
+        room=modest_time(design, chamber),
         dent_rate=dents / (simulated * slow.process.accuracy.gauge),
         collision_rate=collisions / (REPLICAS * time),
         time_to_98=places.value if resolved else mean_time,
@@ -214,6 +212,13 @@ def measure_budget(
         settled=settled,
         intensity=intensity,
     )
+
+
+def modest_time(design: Design, chamber: Chamber) -> float:
+    """Return the simulated time of all replicas [s] that MODEST_GB have room for."""
+    usual = design.changed({"process.accuracy.gauge_mm2": 1.0})
+    counts = FEWEST, max(FEWEST, design.process.accuracy.max_replicas)
+    return min(time_within(1e9 * MODEST_GB, usual, chamber, count) for count in counts)
 
 
 def rough_intensity(

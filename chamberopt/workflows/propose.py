@@ -18,7 +18,12 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.propose.first_design import propose, propose_alike
 from chamberopt.chamber.propose.harmless_ranges import with_harmless_ranges
 from chamberopt.chamber.propose.proposal import new_harm
-from chamberopt.chamber.propose.proposed_budget import TooSlowError, measured_budget, with_budget
+from chamberopt.chamber.propose.proposed_budget import (
+    TooSlowError,
+    measured_budget,
+    with_budget,
+    within_room,
+)
 from chamberopt.chamber.propose.proposed_intensity import (
     Compared,
     as_no_wish,
@@ -57,7 +62,7 @@ from chamberopt.design.shot import ShotSize
 from chamberopt.peening.intensity_pilot import predict_intensity
 from chamberopt.pictures.part import draw_target
 from chamberopt.results.vtp_files import pyvista
-from chamberopt.simulation.budget_pilot import COLLISIONS, LONGER, measure_budget
+from chamberopt.simulation.budget_pilot import COLLISIONS, LONGER, measure_budget, modest_time
 from sim_core import SimulationError
 
 if TYPE_CHECKING:
@@ -204,7 +209,10 @@ def _written(first: Proposal, pilots: _Pilots, folder: Path) -> Proposed:
     pilots.begin(PICTURE_OF)  # before the pilots: to be looked at meanwhile, or if they are killed
     write_text(folder / DESIGN, design_text(first, folder, find_left_out(first)))
     teller.tell(draw_target(first.design, first.chamber, folder / PICTURE, first.known))
-    made = pilots.improve(first) if pilots.wishes.pilot else first
+    if pilots.wishes.pilot:
+        made = pilots.improve(first)
+    else:
+        made = within_room(first, modest_time(first.design, first.chamber))
     pilots.begin(WRITING)
     made = with_harmless_ranges(made)
     if made.chamber is not first.chamber:

@@ -123,11 +123,13 @@ def _not_held(one: HolderChoice, harm: str, tried: int) -> str:
     on = one.reason.partition("; ")[0].removeprefix(f"{what} ")
     others = f", and {tried - 1} further ways to hold it do harm too" if tried > 1 else ""
     comma = "," if "," in on else ""
-    keys = ", ".join(f"{key} = {json.dumps(value)}" for key, value in one.keys.items() if key != "at")
+    values = {key: json.dumps(value) for key, value in one.keys.items() if key != "at"}
+    keys = ", ".join(f"{key} = {value}" for key, value in values.items())
+    wrong = harm.partition("; ")[0]
     return (
-        f"{what} {on}{comma} was tried, but then {harm.partition('; ')[0]}{others}. Take another pose (--pose) or a target "
-        "that leaves another place free (--target), or accept it and write the holder into the "
-        f"design ([holder] {keys}, at these faces)"
+        f"{what} {on}{comma} was tried, but then {wrong}{others}. Take another pose (--pose) or a "
+        "target that leaves another place free (--target), or accept it and write the holder into "
+        f"the design ([holder] {keys}, at these faces)"
     )
 
 

@@ -140,11 +140,7 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
     enough = needed / (REPLICAS * found.dent_rate * USUAL_GAUGE)
     most = COLLISIONS / (REPLICAS * found.collision_rate)
     time = _rounded_up(min(max(enough, LEAST_TIME), max(most, LEAST_TIME), MOST_TIME))
-    # More replicas take the memory that fewer, longer ones do.
-    most_replicas = MOST_REPLICAS if MOST_REPLICAS * time <= found.room else REPLICAS
-    is_full = REPLICAS * time > found.room
-    if is_full:
-        time = max(LEAST_TIME, _rounded_down(found.room / REPLICAS))
+    time, most_replicas, is_full = _within(found.room, time)
     bound = f"{MINUTES:g} minutes of two cores"
     if is_full:
         bound = OF_MEMORY
@@ -177,6 +173,43 @@ def propose_budget(found: Measured, asked: Asked | None = None) -> Budget:
     least = max(SLOWER * DENTS, strength_dents if in_search else 0.0)
     share = min(1.0, least / (dents * gauge)) if found.places else 1.0
     return Budget(treatment, time, gauge, warmup, reasons, REPLICAS * time * share, most_replicas)
+
+
+def _within(room: float, time: float) -> tuple[float, int, bool]:
+    """Return simulated time [s] and most replicas for which there is room, and if time was cut.
+
+    Args:
+        room: that of Measured.
+        time: wanted simulated time of each replica [s].
+    """
+    # More replicas take the memory that fewer, longer ones do.
+    most_replicas = MOST_REPLICAS if MOST_REPLICAS * time <= room else REPLICAS
+    is_full = REPLICAS * time > room
+    if is_full:
+        time = max(LEAST_TIME, _rounded_down(room / REPLICAS))
+    return time, most_replicas, is_full
+
+
+def within_room(made: Proposal, room: float) -> Proposal:
+    """Return a proposal that no pilot measured, simulated for as long as there is room.
+
+    Args:
+        room: that of Measured.
+    """
+    accuracy = made.tables["process.accuracy"]
+    time, most_replicas, is_full = _within(room, accuracy["simulated_time_s"])
+    values = {"simulated_time_s": time, "max_replicas": most_replicas}
+    if all(accuracy[key] == value for key, value in values.items()):
+        return made
+    name = f"process.accuracy.{'simulated_time_s' if is_full else 'max_replicas'}"
+    before = f"{made.reasons[name]}; " if name in made.reasons else ""
+    reason = f"{before}no {'longer' if is_full else 'more'}, to stay within {OF_MEMORY}"
+    return replace(
+        made,
+        tables={**made.tables, "process.accuracy": {**accuracy, **values}},
+        reasons={**made.reasons, name: reason},
+        design=made.design.changed({f"process.accuracy.{key}": x for key, x in values.items()}),
+    )
 
 
 def measured_budget(made: Proposal, found: Measured) -> Budget:

@@ -9,6 +9,7 @@ from chamberopt.chamber.layout.balls import SizeFit
 from chamberopt.chamber.matters import Matter, MatterKind, Urgency, matter_of
 from chamberopt.chamber.propose.first_design import propose
 from chamberopt.chamber.propose.proposal import BallTrial, Proposal, Wanted
+from chamberopt.chamber.propose.proposed_budget import within_room
 from chamberopt.chamber.propose.proposed_mask import LeftOut
 from chamberopt.common.estimate import Estimate
 from chamberopt.design.intensity import PredictedIntensity, WantedIntensity
@@ -51,6 +52,18 @@ def test_only_bevels_are_called_welds(made: Proposal, name: str, told: str) -> N
     """Fillets have a strip beside them too, and are none."""
     of_it = replace(made, reasons={**made.reasons, "part.target": f"{name}: as asked"})
     assert proposal_in_words(of_it, []).sentence.startswith(f"Peen {told} (")
+
+
+@pytest.mark.parametrize("room", [1e6, 20.0, 4.0])
+def test_what_no_pilot_measured_stays_within_a_modest_memory_too(
+    made: Proposal, room: float
+) -> None:
+    bounded = within_room(made, room)
+    accuracy = bounded.design.process.accuracy
+    assert accuracy.max_replicas * accuracy.simulated_time <= room
+    assert bounded.tables["process.accuracy"]["simulated_time_s"] == accuracy.simulated_time
+    told = [text for text in bounded.reasons.values() if "to stay within 2 GB" in text]
+    assert len(told) == (room < 24.0)
 
 
 def test_the_target_has_one_area_and_a_time_that_no_pilot_told_is_a_start(made: Proposal) -> None:
