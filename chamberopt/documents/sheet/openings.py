@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -118,7 +119,7 @@ def _across(result: Result, one: Opening) -> str:
     """Return in words along which axes an opening of the ceiling is as long as the room."""
     chamber = result.design.chamber
     round_mm = getattr(chamber, "diameter_mm", None)
-    sides = (getattr(chamber, key, round_mm) for key in ("length_mm", "width_mm"))
+    sides = tuple(getattr(chamber, key, round_mm) for key in ("length_mm", "width_mm"))
     along = [
         axis
         for axis, side, size in zip("xy", sides, one.size, strict=True)
@@ -126,10 +127,47 @@ def _across(result: Result, one: Opening) -> str:
     ]
     if not along:
         return ""
-    return (
-        f"; along {' and '.join(along)} it is as long as the room: the part goes on over the walls "
-        "there, and the ceiling is the pieces beside it"
-    )
+    axes = " and ".join(along)
+    over = f"; along {axes} it is as long as the room: the part goes on over the walls"
+    strips = _closing_strips(one, along, sides, clearance_of(result), round_mm)
+    if not strips:
+        return f"{over} there, and the ceiling is the pieces beside it"
+    return f"{over} there, and the ceiling is {strips} of the room, each to go on over the walls"
+
+
+def _closing_strips(
+    one: Opening,
+    along: Sequence[str],
+    sides: Sequence[float | None],
+    clear: float,
+    round_mm: float | None,
+) -> str:
+    """Return in words the sizes of the strips of a ceiling beside an opening; "" without any.
+
+    Args:
+        along: the axes along which the opening is as long as the room.
+        sides: of the room along x and y [mm].
+        clear: clearance round the part [m].
+        round_mm: diameter of a round room [mm], whose strips are segments of its circle.
+    """
+    if len(along) != 1:
+        return ""
+    k = "xy".index(along[0])
+    across, long, words = sides[1 - k], sides[k], []
+    if across is None or long is None:
+        return ""
+    for sign, name in ((-1.0, "−"), (1.0, "+")):
+        edge = 1e3 * (sign * one.place[1 - k] + 0.5 * one.size[1 - k] + clear)
+        wide = 0.5 * across - edge
+        if wide < 1e3 * EDGE:
+            continue
+        if round_mm is not None:
+            long = math.sqrt(max(round_mm**2 - 4.0 * edge**2, 0.0))
+        length = f"{plain(round(long, 1))} × {plain(round(wide, 1))}"
+        segment = "a segment of " if round_mm is not None else ""
+        words.append(f"{segment}{length} mm at {name}{'xy'[1 - k]}")
+    kind = "the strips" if len(words) > 1 else "the strip"
+    return f"{kind} beside it, which close {' and '.join(words)}" if words else ""
 
 
 def clearance_of(result: Result) -> float:

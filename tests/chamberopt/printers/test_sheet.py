@@ -25,6 +25,7 @@ from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.number_text import estimate_text
 from chamberopt.coverage.part_impacts import HITS_FILE, load_hits
 from chamberopt.design.almen_strip import USUAL_K
+from chamberopt.design.design import Design, validate
 from chamberopt.design.fixture import LEAST_GAP_MM, joint_in_words, slit_mm, tight_gap_mm
 from chamberopt.design.intensity import WantedIntensity
 from chamberopt.documents.answer import answer_lines
@@ -178,6 +179,30 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
     assert "0.2 mm of clearance all round, in the sizes below" in dict(rows)["holder"]
     assert dict(rows)["gaps"].startswith("round the part as above, of all other joints at most 0.4")
     assert rows_of(result)["Chamber"]["gaps"].startswith("of joints and openings at most 0.42 mm")
+
+
+def test_the_strips_that_close_a_lid_have_sizes(folder: Path) -> None:
+    """A bar of 20 mm lies over the walls of a room of 60 x 80 mm, 10 mm off its middle."""
+    result = load_result(folder)
+    room = {"shape": "box", "length_mm": 60.0, "width_mm": 80.0, "height_mm": 40.0}
+    data = result.design.model_dump()
+    data["chamber"] = {**room, "sonotrode_distance_mm": 20.0}
+    data["holder"] = {"kind": "bore", "clearance_mm": 0.2}
+    result = replace(result, design=validate(Design, data))
+    over = Opening("the ceiling", (0.06, 0.02), (0.0, 0.01, 0.04), 0.02, (0.0, 0.0, 1.0))
+    (told,) = [text for _, text in openings_of(result, over)]
+    assert told.endswith(
+        "along x it is as long as the room: the part goes on over the walls there, and the ceiling "
+        "is the strips beside it, which close 60 × 39.8 mm at −y and 60 × 19.8 mm at +y of the "
+        "room, each to go on over the walls"
+    )
+
+
+def openings_of(result: Result, *openings: Opening) -> list[tuple[str, str]]:
+    """The rows on openings."""
+    tables = setting_tables(result, AsBuilt((50.0,), openings))
+    rows = next(one for one in tables if one.caption == "Chamber").rows
+    return [(row[0], row[1]) for row in rows if row[0] == "opening"]
 
 
 def test_what_a_shop_needs_of_pose_target_strip_and_flanges(folder: Path) -> None:
