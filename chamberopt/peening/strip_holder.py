@@ -101,6 +101,13 @@ def lies_along_y(design: Design, size: StripSize, distance_mm: float | None = No
     return _growth(_edge_mm(size), outline) < 1.0 - FIT_MM
 
 
+def strip_along(design: Design) -> str:
+    """Return the axis along which a whole strip lies in a lid, "" where none fits into it."""
+    if why_no_strip(design, StripSize()):
+        return ""
+    return "y" if lies_along_y(design, StripSize()) else "x"
+
+
 def _lid_of(
     design: Design, distance_mm: float | None
 ) -> tuple[PolygonChamber | Cylinder, float, np.ndarray]:

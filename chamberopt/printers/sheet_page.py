@@ -10,7 +10,6 @@ import io
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,19 +36,20 @@ from chamberopt.documents.sheet import (
     slit_limits,
 )
 from chamberopt.geometry.triangles import tetrahedron_volumes
-from chamberopt.peening.strip_holder import target_level_mm
+from chamberopt.peening.strip_holder import strip_along, target_level_mm
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
 from chamberopt.pictures.charts.figure_style import ignore_settings_here
 from chamberopt.pictures.coverage import draw_coverage
 from chamberopt.pictures.drawing.chamber import (
     LEGEND,
+    NOTHING_BESIDE,
     RASTER,
+    Shown,
     draw_chamber,
     drawing_height,
     drawing_scale,
 )
 from chamberopt.pictures.drawing.cuts import face_size_mm
-from chamberopt.pictures.drawing.dimensions import Limits
 from chamberopt.pictures.drawing.openings import draw_openings
 from chamberopt.printers.report_page import PageFile, require_free_page
 from chamberopt.results.arrays_file import load_result_arrays
@@ -64,7 +64,6 @@ if TYPE_CHECKING:
 
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.checks.openings import Opening
-    from chamberopt.design.sonotrode import Face
     from chamberopt.results.looked_places import LookedPlace
 
 SHEET = "process_sheet.pdf"
@@ -325,11 +324,9 @@ def write_sheet(
         pages = draw_sheet(
             sheet,
             chamber,
-            limits,
-            design.sonotrode.face,
+            Shown(limits, design.sonotrode.face, 1e3 * clear, strip_along(design)),
             outlines,
             coverage_map(loaded.folder, 3 if outlines else VIEWS_A_ROW, places),
-            1e3 * clear,
         )
         _save(path, pages, sheet.name)
     return path, sheet
@@ -356,11 +353,9 @@ def coverage_map(
 def draw_sheet(
     sheet: Document,
     chamber: Chamber,
-    limits: Limits = MappingProxyType({}),
-    face: Face | None = None,
+    shown_beside: Shown = NOTHING_BESIDE,
     openings: Sequence[tuple[str, Opening]] = (),
     coverage: np.ndarray | str | None = None,
-    clearance_mm: float = 0.0,
 ) -> list[Figure]:
     """Return a process sheet as figures of its pages.
 
@@ -372,11 +367,9 @@ def draw_sheet(
 
     Args:
         sheet: a document as process_sheet makes it.
-        limits: what the keys of [chamber] may be, for the drawing's dimensions.
-        face: on which the chamber stands, if it is known.
+        shown_beside: what drawings show beside the chamber.
         openings: those that are cut along the part's section, each with its words.
         coverage: picture of the coverage, red, green and blue of each pixel, or why there is none.
-        clearance_mm: round the part in its openings.
     """
     ignore_settings_here()
     first, further, block = sheet.sections
@@ -396,8 +389,7 @@ def draw_sheet(
     # A drawing of that scale is lower than its room: with less room the letters may be larger.
     tall = drawing_height(chamber, (INNER, min(MOST_DRAWING, room) - CAPTION))
     shown, size, _ = _laid_out(*texts, [CAPTION + tall] * len(SIZES))
-    drawn = limits, face, clearance_mm
-    _drawing(axes, chamber, top, tall, drawn)
+    _drawing(axes, chamber, top, tall, shown_beside)
     _content(Writer(axes, size), shown, top - tall - CAPTION)
     if shown is not whole:
         left = [one for one in content if one not in shown]
@@ -406,10 +398,10 @@ def draw_sheet(
     if drawing_scale(chamber, (INNER, tall)) < LEAST_SCALE:
         larger, y = _further_page("Drawing", sheet.name)
         tall = drawing_height(chamber, (INNER, y - FOOT - CAPTION))
-        _drawing(larger, chamber, y, tall, drawn)
+        _drawing(larger, chamber, y, tall, shown_beside)
         pages.append(larger)
         under = larger, y - tall - CAPTION
-    pages += _further_steps(chamber, sheet.name, drawn)
+    pages += _further_steps(chamber, sheet.name, shown_beside)
     y = 0.0
     if isinstance(coverage, np.ndarray):
         last, y = _coverage_page(coverage, sheet.name, under)
@@ -421,7 +413,7 @@ def draw_sheet(
         else:
             y = Writer(last, 12.0).write("Openings", MARGIN, y - 6.0, INNER, bold=True) - 3.0
         scale = draw_openings(last, openings, MARGIN, y - CAPTION, (INNER, y - FOOT - CAPTION))
-        text = f"{outlines_in_words(clearance_mm)} Scale {scale}, dimensions in mm."
+        text = f"{outlines_in_words(shown_beside.clearance_mm)} Scale {scale}, dimensions in mm."
         Writer(last, 6.0).write(text, MARGIN, y, INNER, colour=DARK_GREY)
     for number, one in enumerate(pages, 1):
         (fields,) = block.content
@@ -539,27 +531,23 @@ def _in_rows(block: Block, measure: Writer) -> tuple[Written, list[Written]]:
     return (lambda write, y: write.caption(caption, MARGIN, y, INNER)), rows
 
 
-def _drawing(
-    axes: Axes, chamber: Chamber, top: float, tall: float, drawn: tuple[Limits, Face | None, float]
-) -> None:
+def _drawing(axes: Axes, chamber: Chamber, top: float, tall: float, beside: Shown) -> None:
     """Draw a chamber as wide as the page, with its legend below.
 
     Args:
         top, tall: upper edge and height of the drawing [mm].
-        drawn: limits, face and clearance of draw_sheet.
+        beside: what it shows beside the chamber.
     """
-    views = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall), *drawn)
+    views = draw_chamber(axes, chamber, MARGIN, top, (INNER, tall), beside)
     Writer(axes, 6.0).write(f"{views} {LEGEND}", MARGIN, top - tall, INNER, colour=DARK_GREY)
 
 
-def _further_steps(
-    chamber: Chamber, name: str, drawn: tuple[Limits, Face | None, float]
-) -> Iterator[Axes]:
+def _further_steps(chamber: Chamber, name: str, beside: Shown) -> Iterator[Axes]:
     """Yield pages with a drawing of each further step in which the part stands otherwise.
 
     Args:
         name: name of the sheet.
-        drawn: limits, face and clearance of draw_sheet.
+        beside: what it shows beside the chamber.
     """
     known = [chamber.part.vertices]
     for number, room in enumerate(chamber.steps[1:], start=2):
@@ -567,7 +555,7 @@ def _further_steps(
         if not any(one.shape == posed.shape and np.allclose(one, posed) for one in known):
             axes, y = _further_page(f"Step {number}", name)
             tall = drawing_height(room, (INNER, MOST_DRAWING))
-            _drawing(axes, room, y, tall, drawn)
+            _drawing(axes, room, y, tall, beside)
             known.append(posed)
             yield axes
 

@@ -9,17 +9,23 @@ import numpy as np
 
 from chamberopt.common.number_text import rounded
 from chamberopt.coverage.metrics import FULL_COVERAGE
+from chamberopt.design.almen_strip import STRIPS
 from chamberopt.documents.sheet.rows import AsBuilt, Row
 from chamberopt.documents.wanted import intensity_text, multiple_in_words
 from chamberopt.documents.wording import per_cent, plain
-from chamberopt.peening.strip import StripSize
-from chamberopt.peening.strip_holder import strip_room, why_no_strip
+from chamberopt.peening.strip_holder import strip_along, strip_room
 
 if TYPE_CHECKING:
     from chamberopt.results.load import Result
     from chamberopt.results.looked_places import LookedPlace
 
 TIME = "time_to_98_s"
+STRIP_WIDTHS_MM = "18.8 to 19.05"  # mm, of Almen strips (SAE J442, as shops quote it)
+# By heart, as no text of the standard was read.
+BLOCK = (
+    "Usual block, by heart, to be compared with SAE J442: hardened, ground flat, at least 10 mm "
+    "thick under the strip; screws M5"
+)
 LENS = "a magnifier of 10 to 30 times (SAE J2277)"
 ASIDE = 0.35  # least share of a normal along an axis for a surface to be told to look that way
 NEAR_END = 1.0 / 3.0  # share of half the target's length from which on a place is near its end
@@ -64,6 +70,8 @@ def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         "for the same time once more and look again; REJECT it if it is still less.",
     )
     yield "intensity", _intensity(result, built)
+    if along := strip_along(result.design):
+        yield "strip holder", _strip_holder(along, built)
 
 
 def _kind(result: Result, built: AsBuilt) -> str:
@@ -132,17 +140,39 @@ def _why_longer(result: Result) -> str:
     return f", for the {plain(percent)} % that are wanted"
 
 
+def _strip_holder(along: str, built: AsBuilt) -> str:
+    """Return in words how an Almen strip is held in the place of the part, with its sizes.
+
+    Args:
+        along: the axis along which it lies.
+    """
+    strip = STRIPS["A"]
+    level = "" if built.level_mm is None else f", {built.level_mm} mm from the sonotrode's face"
+    sizes = f"{plain(1e3 * strip.length)} × {STRIP_WIDTHS_MM} × {plain(1e3 * strip.thickness)} mm"
+    return (
+        f"an A strip, {sizes} (SAE J442), lies flat on a steel block in a lid in the place of the "
+        f"part: its middle on the room's axis, its length along {along}, its peened face down and "
+        f"flush with the lid{level}. Four screws whose heads reach over its long edges hold it. "
+        f"{BLOCK}"
+    )
+
+
 def _intensity(result: Result, built: AsBuilt) -> str:
     """Return in words what accepts the intensity, or that nothing does yet."""
     design = result.design
     wanted = intensity_text(design)
-    if "almen_intensity" in result.metrics:
-        by = "strips at the target, after the times of Measure first"
-        return f"ACCEPT {wanted} by {by}" if wanted else f"no range is asked for: record it by {by}"
+    is_told = "almen_intensity" in result.metrics
     not_by_dents = "not accepted by coverage"
-    if not why_no_strip(design, StripSize()):
+    if strip_along(design):
+        by = f"strips in the lid, {'after the times of' if is_told else 'as under'} Measure first"
+        if is_told:
+            return (
+                f"ACCEPT {wanted} by {by}"
+                if wanted
+                else f"no range is asked for: record it by {by}"
+            )
         aim = f"ACCEPT {wanted}" if wanted else "agree on a range in mmA"
-        return f"{not_by_dents}: {aim} by strips in the lid, as under Measure first"
+        return f"{not_by_dents}: {aim} by {by}"
     accept = f"ACCEPT {wanted}" if wanted else "ACCEPT the first part"
     room = strip_room(design)
     if room is None:

@@ -29,10 +29,11 @@ from chamberopt.documents.sheet.rows import (
 from chamberopt.documents.wanted import may_be_too_short, wanted_rows
 from chamberopt.documents.wording import metric_label, plain
 from chamberopt.peening.strip import StripSize
-from chamberopt.peening.strip_holder import lies_along_y, why_no_strip
+from chamberopt.peening.strip_holder import strip_along
 from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
+    from chamberopt.design.design import Design
     from chamberopt.documents.coverage import Figure
     from chamberopt.results.load import Result
 
@@ -187,23 +188,33 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
             known = rough.on_n_strips if rough.is_for_n else f"{plain(rough.value, 2)} mmA"
             known += f"{rough.factor_in_words}, as impacts on the target would give"
         strips = f"{kind} strips {_strip_times(result)}, to calibrate by"
-        if level_mm is not None and why_no_strip(design, StripSize()):
-            strips = (
-                f"intensity: no strip of {StripSize()} fits into the lid; by a small one or a "
-                "coupon, as under intensity in Acceptance"
-            )
-        elif level_mm is not None:
-            along = " along y," if lies_along_y(design, StripSize()) else ""
-            strips += (
-                f"; in the lid in place of the part,{along} {level_mm} mm from the sonotrode, "
-                "facing it"
-            )
+        if level_mm is not None:
+            strips = _in_the_lid(strips, design, level_mm)
         yield strips, known
     else:
         text = metric_label("almen_intensity").format(intensity)
-        yield f"intensity by A strips at the target, {_strip_times(result)}", text
+        strips = f"intensity by A strips {_strip_times(result)}"
+        yield strips if level_mm is None else _in_the_lid(strips, design, level_mm), text
     masses = {plain(weighed_g(one.shot), 3): None for one in design.in_steps.values()}
     yield "mass of the shot, before and after", f"{' g, then '.join(masses)} g before"
+
+
+def _in_the_lid(strips: str, design: Design, level_mm: int) -> str:
+    """Return in words where strips are peened, or that none fits into the lid.
+
+    Args:
+        strips: which, and after which times.
+        level_mm: that of first_checks.
+    """
+    axis = strip_along(design)
+    if not axis:
+        return (
+            f"intensity: no strip of {StripSize()} fits into the lid; by a small one or a coupon, "
+            "as under intensity in Acceptance"
+        )
+    along = " along y," if axis == "y" else ""
+    where = f"in the lid in place of the part,{along} {level_mm} mm from the sonotrode, facing it"
+    return f"{strips}; {where}"
 
 
 def _over_ranges(result: Result, time: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from chamberopt.pictures.drawing.arrangement import (
 )
 from chamberopt.pictures.drawing.cuts import section_planes
 from chamberopt.pictures.drawing.dimensions import Limits, Point
-from chamberopt.pictures.drawing.plan import draw_face, draw_plan
+from chamberopt.pictures.drawing.plan import draw_face, draw_plan, draw_strip
 from chamberopt.pictures.drawing.section import draw_section
 from chamberopt.pictures.drawing.view import View
 
@@ -35,15 +35,34 @@ LEGEND = (
 )
 
 
+class Shown(NamedTuple):
+    """What a drawing shows beside a chamber.
+
+    Attributes:
+        limits: what the keys of [chamber] may be, for dimensions that show one of them.
+        face: on which the chamber stands, whose joints the plan shows, and its rim where it is
+            larger than the floor and has room beside the plan.
+        clearance_mm: round the part in its openings.
+        strip_along: "x" or "y" for an Almen strip in the plan, along it, in the place of the part;
+            "" for none.
+    """
+
+    limits: Limits = MappingProxyType({})
+    face: Face | None = None
+    clearance_mm: float = 0.0
+    strip_along: str = ""
+
+
+NOTHING_BESIDE = Shown()
+
+
 def draw_chamber(
     axes: Axes,
     chamber: Chamber,
     left: float,
     top: float,
     size: Point,
-    limits: Limits = MappingProxyType({}),
-    face: Face | None = None,
-    clearance_mm: float = 0.0,
+    shown: Shown = NOTHING_BESIDE,
 ) -> str:
     """Draw sections and plan of a chamber on a page, and return what they are in sentences.
 
@@ -51,11 +70,9 @@ def draw_chamber(
         axes: axes of the whole page, in mm.
         left, top: upper left corner of the drawing.
         size: width and height that it may have.
-        limits: what the keys of [chamber] may be, for dimensions that show one of them.
-        face: on which the chamber stands, whose joints the plan shows, and its rim where it is
-            larger than the floor and has room beside the plan.
-        clearance_mm: round the part in its openings.
+        shown: what it shows beside the chamber.
     """
+    limits, face, clearance_mm, strip_along = shown
     (low, high), has_jaws = ends_of(chamber), False
     planes = section_planes(chamber)
     scale, outside, needs, is_below = arrangement(chamber, planes, size)
@@ -76,13 +93,17 @@ def draw_chamber(
     corner = np.array([under if is_below else x + BESIDE, of_plan - 0.5 * deep + 1.0])
     view = View(0, scale, corner, low[:2], high[:2], np.zeros(3))
     draw_plan(axes, chamber, view, planes, limits)
+    strip = ""
+    if strip_along:
+        draw_strip(axes, view, strip_along)
+        strip = " Dotted in the plan: an Almen strip in its holder, which takes the part's place."
     dashed, beyond = ([], "") if face is None else draw_face(axes, chamber, view, face)
     text = scale_in_words(scale)
     what = "Section A–A" if len(planes) == 1 else "Sections A–A and B–B"
     jaws = " White and crossed: jaws." if has_jaws else ""
     dashes = f" Dashed: {' and '.join(dashed)}." if dashed else ""
     rim = f" Not drawn: {beyond}." if beyond else ""
-    return f"{what} and plan, scale {text}.{dashes}{rim}{jaws}"
+    return f"{what} and plan, scale {text}.{dashes}{strip}{rim}{jaws}"
 
 
 def drawing_height(chamber: Chamber, size: Point) -> float:

@@ -51,7 +51,7 @@ from chamberopt.documents.sheet.expected import SHOP_NAMES, shop_name
 from chamberopt.documents.wording import metric_label, per_cent, plain
 from chamberopt.peening.strip_holder import strip_room
 from chamberopt.peening.tolerance_result import ToleranceResult, ToleratedFigure
-from chamberopt.pictures.drawing.chamber import draw_chamber
+from chamberopt.pictures.drawing.chamber import Shown, draw_chamber
 from chamberopt.pictures.drawing.dimensions import with_limits
 from chamberopt.pictures.drawing.section import JAWS
 from chamberopt.pictures.subprocess_drawing import missing_opengl
@@ -264,7 +264,7 @@ def test_the_slit_round_the_sonotrode_is_in_the_dimensions(folder: Path) -> None
         design = result.design.changed({"sonotrode.face": face})
         limits = slit_limits(replace(result, design=design))
         axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
-        draw_chamber(axes, build_chamber(design), 0.0, 100.0, (180.0, 100.0), limits)
+        draw_chamber(axes, build_chamber(design), 0.0, 100.0, (180.0, 100.0), Shown(limits))
         assert want in [one.get_text() for one in axes.texts]
         told = rows_of(replace(result, design=design))["Chamber"]["diameter"]
         is_round = "50.2 to 51.5 mm, centred round the face of 50 mm"
@@ -457,6 +457,17 @@ def test_a_part_is_accepted_by_places_shares_and_strips(folder: Path) -> None:
     wide = replace(result, design=result.design.changed({"chamber.diameter_mm": 140.0}))
     told = dict(acceptance_rows(wide, built))["intensity"]
     assert told.endswith("agree on a range in mmA by strips in the lid, as under Measure first")
+    assert "strip holder" not in rows
+    holder = dict(acceptance_rows(wide, built))["strip holder"]
+    assert holder.startswith("an A strip, 76.2 × 18.8 to 19.05 × 1.29 mm (SAE J442), lies flat on")
+    assert "its length along x, its peened face down and flush with the lid, 31 mm from" in holder
+    # A calibration tells the intensity, and yet no strip fits into this lid.
+    for one in (result, wide):
+        one.metrics.update(almen_intensity=Estimate(0.2, 0.01))
+    assert "no whole strip fits" in dict(acceptance_rows(result, built))["intensity"]
+    checks = [row[0] for row in first_checks(result, 31).rows]
+    assert any("fits into the lid; by a small one or a coupon" in one for one in checks)
+    assert dict(acceptance_rows(wide, built))["intensity"].endswith("the times of Measure first")
     none = dict(acceptance_rows(result, AsBuilt((50.0,))))
     assert none["places to look at"].startswith("all of the target")
     assert "first part" not in none
@@ -722,7 +733,7 @@ def test_dimensions_have_the_tolerances_of_the_design(folder: Path) -> None:
     limits = chamber_limits(result)
     assert limits["height_mm"] == (20.0, 19.5, 20.5)
     axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
-    draw_chamber(axes, build_chamber(result.design), 0.0, 100.0, (180.0, 100.0), limits)
+    draw_chamber(axes, build_chamber(result.design), 0.0, 100.0, (180.0, 100.0), Shown(limits))
     texts = [one.get_text() for one in axes.texts]
     assert "15 ±0.5" in texts
     assert "(15)" in texts  # the plate is the ceiling: this is not height_mm

@@ -13,7 +13,7 @@ from chamberopt.chamber.layout.grip import Clamp, outside_clamp
 from chamberopt.pictures.drawing import section
 from chamberopt.pictures.drawing.arrangement import WALL, arrangement
 from chamberopt.pictures.drawing.centres import Centre, centres, distinct, gaps
-from chamberopt.pictures.drawing.chamber import draw_chamber
+from chamberopt.pictures.drawing.chamber import Shown, draw_chamber
 from chamberopt.pictures.drawing.cuts import _hides_way_out, section_planes
 from chamberopt.pictures.drawing.dimensions import Limits
 from chamberopt.pictures.drawing.section import JAWS
@@ -39,7 +39,7 @@ def texts_of(
 ) -> tuple[list[str], dict[str, float]]:
     """The texts of its drawing at 1:1, and the area of what has each hatch [mm²]."""
     axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
-    draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0), limits)
+    draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0), Shown(limits))
     found: dict[str, float] = {}
     for one in axes.patches:
         if one.get_hatch():
@@ -68,7 +68,7 @@ def test_a_second_section_shows_the_lid_beside_a_part_as_wide_as_the_room(tmp_pa
     chamber = room_with(plate, tmp_path, (0.0, 0.0), holder={"kind": "bore", "clearance_mm": 0.2})
     assert [one.right for one in section_planes(chamber)] == [1, 0]
     axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
-    told = draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0), clearance_mm=0.2)
+    told = draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0), Shown(clearance_mm=0.2))
     assert told.startswith("Sections A–A and B–B")
     assert [one.get_text() for one in axes.texts].count("24.4") == 1
 
@@ -110,7 +110,7 @@ def test_no_wall_is_behind_the_name_of_a_short_holder(tmp_path: Path) -> None:
     held = {"holder": {"kind": "rod", "axis": (1.0, 0.0, 0.0), "diameter_mm": 4.0}}
     axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
     chamber = room_with(cube, tmp_path, (9.0, 0.0), **held)
-    draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0), {})
+    draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0))
     (name,) = (one for one in axes.texts if one.get_text().startswith("holder"))
     assert (name.get_ha(), name.get_va()) == ("center", "bottom")
 
