@@ -24,6 +24,7 @@ def draw_coverage(
     picture: str | Path,
     columns: int = 3,
     marks: Sequence[Sequence[float]] = (),
+    finer: int = 1,
 ) -> str | None:
     """Draw the coverage of one result, or of several below one another on one colour scale.
 
@@ -34,6 +35,7 @@ def draw_coverage(
         columns: views beside one another; further ones of a result are below them.
         marks: places on the part that get numbers from 1 on, each with the normal there, (n, 6)
             [mm].
+        finer: times as many pixels along each side as on a screen, as for print.
 
     Returns:
         None, or one line that says why there is no picture.
@@ -42,6 +44,7 @@ def draw_coverage(
         "folders": [str(one) for one in folders],
         "titles": list(titles),
         "columns": columns,
+        "finer": finer,
     }
     job["marks"] = [list(one) for one in marks]
     return draw_in_subprocess(render_coverage, job, picture)
@@ -71,7 +74,7 @@ def render_coverage(job: dict[str, Any]) -> None:
         marks = [(str(k), np.reshape(one, (1, 6))) for k, one in enumerate(job["marks"], 1)]
         panels = [
             one._replace(marks=seen_marks(marks, part.surface, one.view))
-            for one in part_panels(add, part.inside, part.surface, chamber, views)
+            for one in part_panels(add, part.inside, part.surface, chamber, views, job["finer"])
         ]
         for first in range(0, len(panels), job["columns"]):
             shown = panels[first : first + job["columns"]]

@@ -68,6 +68,7 @@ def part_panels(
     part: Surface,
     chamber: Surface,
     views: tuple[np.ndarray, Sequence[np.ndarray]],
+    finer: int = 1,
 ) -> list[Panel]:
     """Draw the part in its chamber with dimensions, and its target from near, as panels of a page.
 
@@ -76,22 +77,33 @@ def part_panels(
         target, part, chamber: surfaces that the views must hold.
         views: the direction to the eye that shows the chamber, and one or two directions that show
             the target from near.
+        finer: that of View.
     """
     eye, near = views
-    return [chamber_panel(add, part, chamber, eye), *near_panels(add, target, part, near)]
+    whole = chamber_panel(add, part, chamber, eye, finer=finer)
+    return [whole, *near_panels(add, target, part, near, finer)]
 
 
 def chamber_panel(
-    add: Add, part: Surface, chamber: Surface, eye: np.ndarray, caption: str = "in the chamber"
+    add: Add,
+    part: Surface,
+    chamber: Surface,
+    eye: np.ndarray,
+    caption: str = "in the chamber",
+    finer: int = 1,
 ) -> Panel:
-    """Draw the part in its chamber, with dimensions, as a panel of a page."""
+    """Draw the part in its chamber, with dimensions, as a panel of a page.
+
+    Args:
+        finer: that of View.
+    """
 
     def add_both(plotter: Any) -> None:
         add(plotter)
         add_chamber(plotter, chamber)
 
     points = np.concatenate([part.points, chamber.points])
-    view = render_view(add_both, eye, points, SIZE, BORDER_OF_CHAMBER)
+    view = render_view(add_both, eye, points, SIZE, BORDER_OF_CHAMBER, finer)
     return Panel(view, caption, chamber_dimensions(chamber, eye), points)
 
 
@@ -110,17 +122,19 @@ def without_twin(panels: Sequence[Panel]) -> list[Panel]:
 
 
 def near_panels(
-    add: Add, target: Surface, part: Surface, eyes: Sequence[np.ndarray]
+    add: Add, target: Surface, part: Surface, eyes: Sequence[np.ndarray], finer: int = 1
 ) -> list[Panel]:
     """Draw the target from near, from one or two directions, as panels (views with captions).
 
-    `add` is a function that adds the part to a plotter.
+    Args:
+        add: function that adds the part to a plotter.
+        finer: that of View.
     """
     length, whole = (np.linalg.norm(np.ptp(one.points, axis=0)) for one in (target, part))
     is_cut = bool(whole > WHOLE * length)
     points = np.asarray((target if is_cut else part).points)
     return [
-        Panel(render_view(add, eye, points, SIZE, BORDER), caption, is_cut=is_cut)
+        Panel(render_view(add, eye, points, SIZE, BORDER, finer), caption, is_cut=is_cut)
         for eye, caption in zip(eyes, NEAR_CAPTIONS, strict=False)
     ]
 
@@ -132,7 +146,7 @@ def seen_marks(marks: Sequence[tuple[str, np.ndarray]], part: Surface, view: Vie
         marks: texts, each with places [mm] and the normals there, (k, 6), the best place first.
     """
     size, eye, found, taken = float(part.length), view.frame[2], list[Mark](), list[np.ndarray]()
-    high, wide = view.image.shape[:2]
+    high, wide = view.size
     for text, places in marks:
         for one in places:
             place, normal = one[:3], one[3:]

@@ -106,7 +106,7 @@ def write_page(
         bar: colour bar beside the views.
         remarks: sentences below the views.
     """
-    images = [[one.view.image.shape for one in row.panels] for row in rows]
+    images = [[one.view.size for one in row.panels] for row in rows]
     heights = [max(one[0] for one in row) + FOOT for row in images]
     columns = zip_longest(*images, fillvalue=(0, 0))
     widths = [max(one[1] for one in column) for column in columns]
@@ -131,7 +131,7 @@ def write_page(
         x, y, _, _ = place(EDGE, top, 0.0, 0.0)
         figure.text(x, y, literal(title), fontsize=TITLE, va="top", linespacing=1.3)
         for x, panel in zip(left, row.panels, strict=False):
-            rows_of, columns_of = panel.view.image.shape[:2]
+            rows_of, columns_of = panel.view.size
             _draw_panel(figure.add_axes(place(x, top + head, columns_of, rows_of + FOOT)), panel)
         top += head + height
     if bar is not None:
@@ -141,7 +141,7 @@ def write_page(
     axes = figure.add_axes(place(0.0, top, across, foot), xlim=(0.0, across), ylim=(foot, 0.0))
     axes.set_axis_off()
     _draw_foot(axes, below, entries)
-    save_picture(figure, Path(picture))
+    save_picture(figure, Path(picture), max(one.view.finer for row in rows for one in row.panels))
 
 
 def _wrapped(text: str, pixels: float, font: int) -> str:
@@ -153,8 +153,9 @@ def _wrapped(text: str, pixels: float, font: int) -> str:
 def _draw_panel(axes: Axes, panel: Panel) -> None:
     from matplotlib.patches import Rectangle
 
-    rows, columns = panel.view.image.shape[:2]
-    axes.imshow(panel.view.image, interpolation="antialiased")
+    rows, columns = panel.view.size
+    corners = (-0.5, columns - 0.5, rows - 0.5, -0.5)
+    axes.imshow(panel.view.image, interpolation="antialiased", extent=corners)
     axes.set_aspect("auto")
     axes.set_xlim(-0.5, columns - 0.5)
     axes.set_ylim(rows + FOOT - 0.5, -0.5)
@@ -175,7 +176,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
 
 def draw_scale(axes: Axes, view: View, place: tuple[float, float]) -> None:
     """Draw a scale bar of a round length in mm, at most a quarter of the image's width."""
-    longest = 0.25 * view.image.shape[1] * view.pixel_mm
+    longest = 0.25 * view.size[1] * view.pixel_mm
     power = 10.0 ** np.floor(np.log10(longest))
     length = max(step * power for step in (1.0, 2.0, 5.0) if step * power <= longest)
     x, y = place

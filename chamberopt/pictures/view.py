@@ -18,16 +18,24 @@ class View(NamedTuple):
     """A rendered image of surfaces, and the position of its pixels in space.
 
     Attributes:
-        image: red, green and blue of each pixel, uint8, shape (rows, columns, 3).
+        image: red, green and blue of each of its points, uint8, (finer rows, finer columns, 3).
         frame: unit vectors to the right, upwards and to the eye, (3, 3).
         corner: upper left corner of the image along the first two unit vectors [mm].
         pixel_mm: size of a pixel [mm].
+        finer: points of the image along each side of a pixel.
     """
 
     image: np.ndarray
     frame: np.ndarray
     corner: np.ndarray
     pixel_mm: float
+    finer: int = 1
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Rows and columns of pixels."""
+        rows, columns = self.image.shape[:2]
+        return rows // self.finer, columns // self.finer
 
     def pixels(self, points: np.ndarray) -> np.ndarray:
         """Return the columns and rows (k, 2) in the image of points [mm], (k, 3)."""
@@ -41,6 +49,7 @@ def render_view(
     points: np.ndarray,
     size: tuple[int, int],
     border: int,
+    finer: int = 1,
 ) -> View:
     """Render surfaces from one direction, in an image that they fill.
 
@@ -50,6 +59,7 @@ def render_view(
         points: points that fill the image [mm], (k, 3).
         size: largest width and height [pixels]. A side that is not filled is made shorter.
         border: free border round the points [pixels].
+        finer: that of View.
     """
     frame = view_frame(eye)
     flat = np.asarray(points, dtype=float) @ frame.T
@@ -63,10 +73,10 @@ def render_view(
     light(plotter)
     add(plotter)
     aim_along(plotter, frame, 0.5 * (low + high) @ frame, 0.5 * rows * pixel_mm)
-    image = np.asarray(plotter.screenshot(None, return_img=True))[..., :3]
+    image = np.asarray(plotter.screenshot(None, return_img=True, scale=finer))[..., :3]
     plotter.close()
     corner = 0.5 * (low + high)[:2] + 0.5 * pixel_mm * np.array([-columns, rows])
-    return View(image, frame, corner, pixel_mm)
+    return View(image, frame, corner, pixel_mm, finer)
 
 
 def aim_along(plotter: Any, frame: np.ndarray, middle: np.ndarray, half_height: float) -> None:

@@ -81,6 +81,7 @@ CAPTION, ROW = 9.5, 8.0  # mm, of the caption of three lines, and of a row of th
 FIELDS = 6  # in a row of the title block
 FOOT = MARGIN + 2.0 * ROW + 3.0  # mm, where the content ends
 RED = "#C00000"
+PRINTED = 2  # times as many pixels along a side of the coverage as on a screen: about 380 an inch
 VIEWS_A_ROW = 2  # of the picture of the coverage, where no outlines are below it on its page
 NO_COVERAGE = "No page shows the coverage by place: {}."
 COVERAGE_HEAD = 20.0  # mm, of title and sentences above the picture of the coverage
@@ -345,7 +346,7 @@ def coverage_map(
     marks = [[*map(float, 1e3 * one.at), *map(float, one.normal)] for one in places]
     with private_folder() as own:
         picture = Path(own) / "coverage.png"
-        if reason := draw_coverage([folder], [""], picture, columns, marks):
+        if reason := draw_coverage([folder], [""], picture, columns, marks, PRINTED):
             return reason.removeprefix(f"{picture.name} ").removeprefix("skipped: ")
         return np.asarray(imread(picture))[..., :3]
 
@@ -360,9 +361,9 @@ def draw_sheet(
     """Return a process sheet as figures of its pages.
 
     The first page has a heading, sentences in red, a drawing of the chamber and the content. Where
-    its scale is small, a page of its own has a larger one, and under it the coverage by place if
-    there is room. Each further step in which the part
-    stands otherwise has a page with its drawing. The last pages have the coverage by place, and the
+    its scale is small, a page of its own has a larger one. Each further step in which the part
+    stands otherwise has a page with its drawing. The coverage by place is under the last tables or
+    the larger drawing if it has room there, else on a page of its own. The last page has the
     outlines of openings. Each page has the title block at its foot.
 
     Args:
@@ -391,10 +392,12 @@ def draw_sheet(
     shown, size, _ = _laid_out(*texts, [CAPTION + tall] * len(SIZES))
     _drawing(axes, chamber, top, tall, shown_beside)
     _content(Writer(axes, size), shown, top - tall - CAPTION)
+    under: tuple[Axes, float] | None = None
     if shown is not whole:
         left = [one for one in content if one not in shown]
-        pages += _further_pages(further, left, sheet.name)
-    under: tuple[Axes, float] | None = None
+        tables, bottom = _further_pages(further, left, sheet.name)
+        pages += tables
+        under = tables[-1], bottom
     if drawing_scale(chamber, (INNER, tall)) < LEAST_SCALE:
         larger, y = _further_page("Drawing", sheet.name)
         tall = drawing_height(chamber, (INNER, y - FOOT - CAPTION))
@@ -479,16 +482,16 @@ def _heading(axes: Axes, title: str, sheet: Document, red: Sequence[Sentence]) -
     return y
 
 
-def _further_pages(section: Section, left: Sequence[Block], name: str) -> Iterator[Axes]:
-    """Yield pages with the tables of a section, one below the other, as wide as the page.
+def _further_pages(section: Section, left: Sequence[Block], name: str) -> tuple[list[Axes], float]:
+    """Return pages with the tables of a section, and the height of the bottom of the last one [mm].
 
-    A page is not finished before the next one is asked for.
+    The tables are one below the other, as wide as the page.
 
     Args:
         left: what the first page has no room for. It stands above them.
     """
     axes, top = _further_page(section.title, name)
-    yield axes
+    pages = [axes]
     measure, write, y = Writer(None, SIZES[0]), Writer(axes, SIZES[0]), top
     measured = [one for one in left if not isinstance(one, Table) or one.head]
     for block in (*measured, *(one for one in left if one not in measured), *section.content):
@@ -498,11 +501,12 @@ def _further_pages(section: Section, left: Sequence[Block], name: str) -> Iterat
             tall = -row(measure, 0.0) - (0.0 if is_begun else head(measure, 0.0))
             if y - tall <= FOOT and y < top:
                 axes, y = _further_page(section.title, name)
-                yield axes
+                pages.append(axes)
                 write, is_begun = Writer(axes, SIZES[0]), False
             y = y if is_begun else head(write, y)
             y, is_begun = row(write, y) - 0.3 * write.line, True
         y -= 0.8 * write.line
+    return pages, y
 
 
 def _in_rows(block: Block, measure: Writer) -> tuple[Written, list[Written]]:
@@ -578,9 +582,7 @@ def _coverage_page(
         axes, y = _further_page(title, name)
     y = Writer(axes, 7.0).write(COVERAGE, MARGIN, y, INNER) - 3.0
     size = np.array([columns, rows]) * min(INNER / columns, (y - FOOT) / rows)
-    axes.imshow(
-        picture, extent=(MARGIN, MARGIN + size[0], y - size[1], y), interpolation="antialiased"
-    )
+    axes.imshow(picture, extent=(MARGIN, MARGIN + size[0], y - size[1], y), interpolation="none")
     axes.set(xlim=(0.0, WIDTH), ylim=(0.0, HEIGHT), aspect="auto")
     return axes, float(y - size[1])
 

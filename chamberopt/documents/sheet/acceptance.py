@@ -53,7 +53,7 @@ def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         )
         yield (
             "places to look at",
-            f"{listed}; numbered on the page Coverage by place: where the "
+            f"{listed}; numbered under Coverage by place: where the "
             f"fewest dents are expected, off the edges; by {LENS}",
         )
         if text := _first_part(result, built):

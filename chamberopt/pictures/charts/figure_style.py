@@ -44,10 +44,10 @@ def ignore_settings_here() -> None:
         matplotlib.rcdefaults()
 
 
-def save_picture(figure: Figure, path: Path) -> None:
-    """Write a figure as .png, whole or not at all."""
+def save_picture(figure: Figure, path: Path, finer: int = 1) -> None:
+    """Write a figure as .png, whole or not at all, with `finer` times as many pixels a side."""
     content = io.BytesIO()
-    figure.savefig(content, format="png")
+    figure.savefig(content, format="png", dpi=finer * figure.dpi)
     write_bytes(path, content.getvalue())
 
 
