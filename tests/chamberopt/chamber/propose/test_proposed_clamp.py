@@ -1,14 +1,18 @@
 """What a part is clamped by outside of its chamber."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from manifold3d import Manifold
 
 from chamberopt.chamber.layout import grip
 from chamberopt.chamber.layout.end import DEEP
 from chamberopt.chamber.layout.target import Surface
 from chamberopt.chamber.propose import proposed_clamp
+from chamberopt.chamber.propose.first_design import propose
+from chamberopt.chamber.propose.proposal import Wanted
 from chamberopt.chamber.propose.proposed_clamp import (
     FREE,
     OFF_AXIS,
@@ -18,6 +22,8 @@ from chamberopt.chamber.propose.proposed_clamp import (
     why_not_turned,
 )
 from chamberopt.design.fixture import tight_gap_mm
+from tests.helpers.mesh_files import write_stl
+from tests.helpers.turned_parts import stepped_shaft
 
 
 class Pretended(SimpleNamespace):
@@ -124,3 +130,19 @@ def test_a_part_turns_where_it_is_round_held_and_clear_of_the_walls(
         assert bool(why) == bool(found)
     monkeypatch.setattr(proposed_clamp, "turning_axis", lambda *_: None)
     assert why_not_turned(SimpleNamespace(chamber=chamber, design=shot)) == "no axis is given"
+
+
+def test_bolt_holes_outside_of_the_walls_are_offered_for_screws(tmp_path: Path) -> None:
+    """A flange of 120 mm, of which the fillet at its hub is peened, with four bolt holes."""
+    body = stepped_shaft([(60.0, 12.0), (25.0, 30.0)], 3.0, sides=48)
+    hole = Manifold.cylinder(20.0, 4.5, circular_segments=24)
+    for x, y in ((47, 0), (0, 47), (-47, 0), (0, -47)):
+        body -= hole.translate([x, y, -1])
+    mesh = body.to_mesh()
+    path = write_stl(tmp_path / "flange.stl", mesh.vert_properties[mesh.tri_verts])
+    made = propose(path, Wanted("mm", ball_mm=1.5), lambda _: [])
+    assert made.tables["holder"]["kind"] == "bore"
+    assert (
+        ", or by screws through its 4 holes of 9 mm there; the wall"
+        in (made.reasons["holder.kind"])
+    )
