@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chamberopt.chamber.checks.fillets import OF_FILLET
+from chamberopt.chamber.propose.proposed_budget import UNEVEN
 from chamberopt.common.number_text import rounded
 from chamberopt.coverage.metrics import FULL_COVERAGE
 from chamberopt.design.almen_strip import STRIPS
@@ -56,6 +59,8 @@ def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
             f"{listed}; numbered under Coverage by place: where the "
             f"fewest dents are expected, off the edges; by {LENS}",
         )
+        if text := _slowest(result, built):
+            yield "slowest place", text
         if text := _first_part(result, built):
             yield "first part", text
     else:
@@ -98,6 +103,41 @@ def _lies(one: LookedPlace, kind: str) -> str:
     ends = ("−x end", "+x end"), ("−y end", "+y end"), ("lower end", "upper end")
     end = "the middle" if abs(share) < NEAR_END else f"the {ends[axis][int(share > 0.0)]}"
     return f"{kind} that looks {' and '.join(looks)}, near {end} of the target"
+
+
+def _slowest(result: Result, built: AsBuilt) -> str:
+    """Return in words how much longer the least covered place takes, and what shortens it.
+
+    The text is empty where it takes hardly longer than the target on average.
+    """
+    exposure, place = result.metrics.get("exposure"), built.places[0]
+    if exposure is None or not exposure.has_number or not place.density > 0.0:
+        return ""
+    longer = exposure.value * -math.log1p(-FULL_COVERAGE) / place.density
+    if longer < UNEVEN:
+        return ""
+    ball = min(result.design.ball_diameters)
+    narrow = [one for one in built.radii if OF_FILLET * one < ball]
+    turns = result.design.effects.part_turn is not None or bool(result.design.steps)
+    if narrow:
+        what = (
+            f"its fillet of {plain(1e3 * min(narrow))} mm is narrow for balls of "
+            f"{plain(1e3 * ball)} mm: simulate balls of at most "
+            f"{plain(1e3 * OF_FILLET * min(narrow), 2)} mm"
+        )
+    elif place.normal[2] > ASIDE and not turns:
+        what = "it looks up: simulate the part turned over after half of the time ([[steps]])"
+    elif abs(place.normal[2]) <= ASIDE and not turns:
+        what = (
+            "it looks aside: simulate more room between it and the wall, or a second pose in which "
+            "it looks down ([[steps]])"
+        )
+    else:
+        what = "simulate more room beside it and a larger distance from the sonotrode"
+    return (
+        f"place 1 takes about {rounded(longer, 2)} times as long as the target on average, and the "
+        f"time is for it. If that is too long: {what}"
+    )
 
 
 def _first_part(result: Result, built: AsBuilt) -> str:

@@ -448,6 +448,19 @@ def test_a_part_is_accepted_by_places_shares_and_strips(folder: Path) -> None:
     assert "down, near the middle of the target" in told["places to look at"]
     assert f"{per_cent(places[0].coverage(half / 5.0))} at 1" in rows["first part"]
     assert f"98 % or more of each of places 1 to {len(places)}" in rows["ACCEPT or REJECT"]
+    third = result.metrics["exposure"].value * math.log(50.0) / 3.0  # of the mean's dents
+    slow = [one._replace(density=third) for one in places]
+    down = [one._replace(normal=np.array([0.0, 0.0, -1.0])) for one in slow]
+    up = [one._replace(normal=np.array([0.0, 0.0, 1.0])) for one in slow]
+    for seen, radii, remedy in (
+        (up, (), "it looks up: simulate the part turned over after half of the time"),
+        (down, (), "simulate more room beside it and a larger distance from the sonotrode"),
+        (down, (1e-3,), "simulate balls of at most 0.5 mm"),
+    ):
+        lagging = AsBuilt((50.0,), level_mm=31, places=seen, radii=radii)
+        told = dict(acceptance_rows(result, lagging))["slowest place"]
+        assert told.startswith("place 1 takes about 3 times as long as the target on average, and")
+        assert told.endswith(remedy) or f"{remedy} (" in told
     room = strip_room(result.design)
     assert room is not None
     assert room.disc == pytest.approx(50.0, rel=0.01)
