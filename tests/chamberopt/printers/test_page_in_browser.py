@@ -169,32 +169,6 @@ def test_pointing_at_the_target_shows_its_numbers_and_the_triangles(shown: OpenP
     shown.page.click("#places >> text=the first numbers alone")
 
 
-# Layers of the marks at x = 0 and x = 10 mm of a surface, of which a section leaves x < 5 mm.
-MARKS = """() => {
-    const place = document.createElement("div");
-    place.style.cssText = "width: 100px; height: 100px";
-    document.body.append(place);
-    const view = new View3D(place), points = new Float32Array([0, 0, 0, 10, 0, 0, 0, 10, 0]);
-    view.surface("part", { points, triangles: new Uint32Array([0, 1, 2]), open: true });
-    view.look({ middle: [5, 0, 0], eye: [5, 0, 60], size: 20 });
-    const marks = view.texts("kept", [["1", [0, 0, 0]], ["2", [10, 0, 0]]]);
-    marks.userData.on = "part";
-    const seen = () => { view.image(); return marks.children.map((one) => one.layers.mask); };
-    const before = seen();
-    view.section.cut([-1, 0, 0], -5);
-    const found = [before, seen()];
-    view.dispose();
-    place.remove();
-    return found;
-}"""
-
-
-def test_the_mark_of_a_place_is_cut_away_with_the_part(shown: OpenPage) -> None:
-    before, cut = shown.page.evaluate(MARKS)
-    assert before == [1, 1]  # the camera sees the layer 0
-    assert cut == [1, 2]
-
-
 @pytest.mark.long
 def test_a_saturated_target_begins_with_what_tells_places_apart(
     browser: Any, tmp_path: Path
@@ -290,3 +264,29 @@ def test_a_notebook_shows_the_same_view_in_a_frame(
     assert [one for one in requests if not one.startswith(("file:", "about:"))] == []
     assert errors == []
     page.close()
+
+
+# Layers of the marks at x = 0 and x = 10 mm of a surface, of which a section leaves x < 5 mm.
+MARKS = """() => {
+    const place = document.createElement("div");
+    place.style.cssText = "width: 100px; height: 100px";
+    document.body.append(place);
+    const view = new View3D(place), points = new Float32Array([0, 0, 0, 10, 0, 0, 0, 10, 0]);
+    view.surface("part", { points, triangles: new Uint32Array([0, 1, 2]), open: true });
+    view.look({ middle: [5, 0, 0], eye: [5, 0, 60], size: 20 });
+    const marks = view.texts("kept", [["1", [0, 0, 0]], ["2", [10, 0, 0]]]);
+    marks.userData.on = "part";
+    const seen = () => { view.image(); return marks.children.map((one) => one.layers.mask); };
+    const before = seen();
+    view.section.cut([-1, 0, 0], -5);
+    const found = [before, seen()];
+    view.dispose();
+    place.remove();
+    return found;
+}"""
+
+
+def test_the_mark_of_a_place_is_cut_away_with_the_part(shown: OpenPage) -> None:
+    before, cut = shown.page.evaluate(MARKS)
+    assert before == [1, 1]  # the camera sees the layer 0
+    assert cut == [1, 2]
