@@ -205,7 +205,8 @@ def test_a_section_shows_the_inside_of_the_part(shown: OpenPage) -> None:
     assert np.abs(cut - before).max() > 0.2
     assert "chamber wall" in shown.page.locator("#kinds").inner_text()
     shown.page.click(".tools >> text=Section")
-    assert np.abs(shown.pixels() - before).max() < 0.02
+    # The first row is half the page's, as it scrolls by parts of a pixel.
+    assert np.abs(shown.pixels() - before)[1:].max() < 0.02
 
 
 def test_the_chamber_can_be_hidden_and_folded_text_opens(shown: OpenPage) -> None:
