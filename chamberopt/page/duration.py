@@ -39,9 +39,9 @@ SPREAD = 3
 # A design is tried on all cores for MOMENT_S of simulation, and given up after TRY_S. Its pace then
 # is so many times off: the balls fly higher later on, and other work takes cores.
 MOMENT_S, TRY_S, UNSURE = 3.0, 120.0, 1.3
-# s beside the replicas: to start, build and check, and to write and draw what is found. 7 to 14 s
-# were measured of plate, blade and gear.
-AROUND_S = 10.0
+# Least and most time [s] beside the replicas: to start, build and check, and to write and draw what
+# is found. 7 to 14 s were measured of plate, blade and gear, 20 s of a bracket beside other work.
+AROUND_S = (7.0, 20.0)
 # Time of the ends of what is not calibrated over that of the figures, as proposals count it too.
 ENDS = 1.2
 AS_ASKED = "asked"
@@ -87,8 +87,7 @@ def foretold(path: Path, results: Iterable[Path], ranges: bool = True) -> dict[s
                 most = SPREAD * seconds if result.record.study is None else seconds
                 return {AS_ASKED: Foretold(_in_words(seconds, most))}
             return {
-                name: _by_result(scaled(design, scale), result, ranges and scale != "quick")
-                for name, scale in EFFORTS.items()
+                name: _by_result(design, scale, result, ranges) for name, scale in EFFORTS.items()
             }
     return {}
 
@@ -155,26 +154,32 @@ def _at_pace(design: Design, pace: float, ranges: bool) -> str:
         times * pace * _replica_s(design) * math.ceil(count / cores)
         for count in (effort.first, effort.most)
     )
-    words = _in_words(AROUND_S + least / UNSURE, AROUND_S + least * UNSURE)
+    words = _with_start(least / UNSURE, least * UNSURE)
     if most <= UNSURE * least:
         return words
-    longest = _in_words(AROUND_S + most * UNSURE, AROUND_S + most * UNSURE).removeprefix("about ")
+    longest = _with_start(most * UNSURE, most * UNSURE).rpartition(" to ")[2].removeprefix("about ")
     return f"{words}, and up to {longest} until it is as sure as it asks"
 
 
-def _by_result(design: Design, result: Result, ranges: bool) -> Foretold:
-    """Return how long a design takes by a result of a like one, and whether it tells too little."""
-    seconds = AROUND_S + _whole_seconds(design, 1, result, ranges)
+def _by_result(design: Design, scale: Scale | None, result: Result, ranges: bool) -> Foretold:
+    """Return how long an effort takes by a result of a like design, and if it is too little."""
+    taken = scaled(design, scale)
+    seconds = _whole_seconds(taken, 1, result, ranges and scale != "quick")
     needed = result.record.field.simulated_s_needed.mean_and_std
-    accuracy, few = design.process.accuracy, ""
+    accuracy, few = taken.process.accuracy, ""
     most = Effort.of(accuracy).most * accuracy.simulated_time_s
     if needed is not None and most < needed:
-        enough = float(f"{1.1 * needed * accuracy.simulated_time_s / most:.2g}")
-        few = (
-            f"too little to tell the mean coverage, by {result.folder.name}: it takes "
-            f"process.accuracy.simulated_time_s = {plain(enough)}"
-        )
-    return Foretold(_in_words(seconds, seconds), few)
+        times = SCALES[scale] if scale else 1.0
+        enough = float(f"{1.1 * needed * accuracy.simulated_time_s / (most * times):.2g}")
+        remedy = f"it takes process.accuracy.simulated_time_s = {plain(enough)}"
+        few = f"too little to tell the mean coverage, by {result.folder.name}: "
+        few += "take more of it" if scale == "quick" else remedy
+    return Foretold(_with_start(seconds, seconds), few)
+
+
+def _with_start(least: float, most: float) -> str:
+    """Return in words the time between two times [s] of replicas, with what is beside them."""
+    return _in_words(AROUND_S[0] + least, AROUND_S[1] + most)
 
 
 def _is_like(one: Design, other: Design) -> bool:

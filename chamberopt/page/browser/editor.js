@@ -112,14 +112,17 @@ function followCavity() {
 
 // What a change did to the ways out of the chamber besides, against the design as its file has it.
 const inFile = new Map(); // openings of each step: wall and size
-function sayEffect(openings) {
+function sayEffect(openings, isRefused = false) {
+  if (isRefused) { find("effect").hidden = true; return; }
   if (!Object.keys(state.shown).length) inFile.set(state.step, openings);
-  const before = inFile.get(state.step) ?? openings, sizes = (list, wall) => list.filter(([one]) => one === wall).map(([, size]) => size).join(" and ");
+  const before = inFile.get(state.step) ?? openings;
+  const sizes = (list, wall) => Object.entries(Object.groupBy(list.filter(([one]) => one === wall), ([, size]) => size))
+    .map(([size, same]) => same.length > 1 ? `${same.length} of ${size}` : size).join(" and ");
   const told = [...new Set([...openings, ...before].map(([wall]) => wall))].map((wall) => {
     const now = sizes(openings, wall), was = sizes(before, wall);
     if (now === was) return "";
-    if (!was) return `the part now goes out through ${wall}, by an opening of ${now}`;
-    return now ? `the opening in ${wall} is now ${now}; in the file it is ${was}` : `the part no longer goes out through ${wall}`;
+    if (!was) return `the part now goes out through ${wall}, opening ${now}`;
+    return now ? `openings in ${wall} are now ${now}, in the file ${was}` : `the part no longer goes out through ${wall}`;
   }).filter(Boolean);
   find("effect").textContent = told.length ? `With these values ${told.join("; ")}.` : "";
   find("effect").hidden = !told.length;
@@ -128,7 +131,7 @@ function sayEffect(openings) {
 function busy(text) { find("busy").textContent = text; }
 
 function refuse(error) {
-  if (error) busy("");
+  if (error) { busy(""); sayEffect([], true); }
   find("error").replaceChildren(...onPage(error ? wordsOf(error) : ""));
   find("error").hidden = !error;
   sayAtFields(error?.at);

@@ -145,7 +145,8 @@ function showParts({ quantities, scenes, scales, kinds }) {
       ["width of the triangle's 95 % interval", `${number(scene.own.interval[t])} %`],
       ["simulated impacts on the triangle", String(scene.impacts[t])],
       ["triangle", `element ${scene.element[t]}, triangle ${scene.number[t]} of the part`]);
-    return { first: [...first.filter(Boolean), ...where, ["place x, y, z", Measure.at(hit.place)]], others, shown, place: hit.place };
+    others.unshift(["place x, y, z", Measure.at(hit.place)]);
+    return { first: [...first.filter(Boolean), ...where], others, shown, place: hit.place };
   }
 
   function point(event, i) {

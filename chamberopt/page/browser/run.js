@@ -85,7 +85,7 @@ function showEfforts(efforts, origin = "") {
   const isDesign = chosen()?.kind === "design";
   for (const one of document.querySelectorAll("[name=effort]")) {
     const { words = "", few = [] } = efforts[one.value] ?? {}, place = one.parentElement.querySelector("small");
-    place.replaceChildren(...(words ? [`${words}${origin}`] : []), ...(few.length ? [element("span", { className: "warning" }, "; ", ...onPage(few))] : []));
+    place.replaceChildren(...(words ? [`${words}${origin}`] : []), ...(few.length ? [element("span", { className: "few" }, "; ", ...onPage(few))] : []));
   }
   if (!isDesign && efforts.asked) find("lasts").textContent = `It will take ${efforts.asked.words}.`;
 }

@@ -75,7 +75,7 @@ def test_a_change_that_opens_the_ceiling_says_so(opened: Page) -> None:
     opened.wait("data-checked=reach")
     expect(effect).to_be_hidden()
     opened.put("chamber.height_mm", 25)
-    told = "With these values the part now goes out through the ceiling, by an opening of "
+    told = "With these values the part now goes out through the ceiling, opening "
     expect(effect).to_contain_text(told, timeout=WAIT)
     opened.wait("data-checked=reach")
     opened.page.click("#undo")
