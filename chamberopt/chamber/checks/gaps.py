@@ -337,6 +337,25 @@ def find_ledges(
     return found
 
 
+def resting_on_holder(design: Design, chamber: Chamber) -> int:
+    """Return how many balls have room on level places of the holder, as on a collar that is low.
+
+    Few of them, of which there is no warning, still are no longer part of the shot. There are none
+    on an arbor, which is round, nor on what turns.
+    """
+    from sim_core import Rest
+
+    holder, turns = design.holder, design.effects.part_turn is not None
+    if not design.effects.gravity or turns or "holder" not in chamber.fixtures:
+        return 0
+    if holder is not None and holder.kind == "arbor":
+        return 0
+    normal = -area_vectors(chamber.vertices, chamber.triangles)[chamber.on_fixture("holder")]
+    flat = np.hypot(normal[:, 0], normal[:, 1]) <= Rest().resistance * normal[:, 2]
+    area = float(np.linalg.norm(normal[flat & (normal[:, 2] > 0.0)], axis=1).sum())
+    return int(area / design.shot.diameter**2)
+
+
 # Of a gutter: balls up to so many times as large show where it is; least share of a ball's weight
 # on each of its faces, as on a wall beside a face that falls to it by a degree; steepest slope.
 GUTTER_BALLS, CARRIED, LEVEL_LINE = 1.3, 0.02, 0.02

@@ -15,6 +15,7 @@ import numpy as np
 
 from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import touched
+from chamberopt.chamber.checks.gaps import resting_on_holder
 from chamberopt.chamber.checks.place_names import PART, one_of
 from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.layout.arbor import Bore
@@ -105,10 +106,20 @@ def held(
             reasons["mask.plugs"] = "the pins that hold it fill these holes, flush with their rims"
         made, harm = _harmless(tables, reasons, floor, free, shop, hidden)
         if made is not None:
-            return made
+            return _with_balls_on_holder(made)
         why = why or _not_held(one, harm, len(choices))
     text = f"sonotrode to ceiling; {MatterKind.NOTHING_HOLDS}: {why}"
     return replace(free, reasons={**free.reasons, "chamber.height_mm": text})
+
+
+def _with_balls_on_holder(made: Proposal) -> Proposal:
+    """Return a proposal whose holder's reason tells how many balls may come to rest on it."""
+    count = resting_on_holder(made.design, made.chamber)
+    if not count:
+        return made
+    of_all = f"{count} of the {made.design.shot.count:,} balls"
+    told = f"{made.reasons['holder.kind']}; up to {of_all} can come to rest on its level places"
+    return replace(made, reasons={**made.reasons, "holder.kind": told})
 
 
 def _not_held(one: HolderChoice, harm: str, tried: int) -> str:
@@ -136,6 +147,11 @@ def _not_held(one: HolderChoice, harm: str, tried: int) -> str:
 def _is_same(keys: dict[str, Any], others: dict[str, Any]) -> bool:
     """Return whether two holders are of one kind and at one place, whatever their sizes."""
     return all(keys.get(key) == others.get(key) for key in ("kind", "at", "axis"))
+
+
+def nothing_holds(made: Proposal) -> bool:
+    """Return whether a part floats in its chamber."""
+    return "holder" not in made.tables and bool(made.chamber.pieces_in_air)
 
 
 def hangs_by_a_face(made: Proposal) -> bool:

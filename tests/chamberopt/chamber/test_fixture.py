@@ -10,7 +10,7 @@ from shapely import Polygon
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.checks.check import first_warnings, surface_names, warnings
-from chamberopt.chamber.checks.gaps import find_ledges
+from chamberopt.chamber.checks.gaps import find_ledges, resting_on_holder
 from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.fixture import size_in_words
 from chamberopt.chamber.part import turning_axis
@@ -479,6 +479,10 @@ def test_checks_name_holder_and_mask(parts: Path) -> None:
     assert up[names == "the holder"].any()
     ledges = [one.message for one in find_ledges(given, chamber)]
     assert any("on the holder" in text and "holder.thickness_mm" in text for text in ledges)
+    level = 30.0 * 20.0 - np.pi * 8.0**2  # mm², beside the rod of 0.8 x 20 mm that carries it
+    count = level / (1e3 * given.shot.diameter) ** 2
+    assert resting_on_holder(given, chamber) == pytest.approx(count, rel=0.01, abs=1.0)
+    assert resting_on_holder(given.changed({"effects.gravity": False}), chamber) == 0
     (mask,) = (
         one
         for one in first_warnings(given, chamber, chamber_mesh(chamber))
