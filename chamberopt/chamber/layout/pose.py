@@ -118,6 +118,21 @@ def pose_by_size(
     return turns_down(sign * np.eye(3)[axis])
 
 
+def upside_down(
+    vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, turns: Turns
+) -> Turns | None:
+    """Return turns with which a part stands upside down, if its target is exposed nearly as well.
+
+    Args:
+        vertices, triangles, target: as of propose_pose.
+        turns: the pose that would be taken otherwise [degrees].
+    """
+    weight, normal = _weighted_normals(vertices, triangles, target)
+    down = _down(turns)
+    is_as_good = _evenness(weight, normal, -down) >= _evenness(weight, normal, down) - HANGING
+    return turns_down(-down) if is_as_good else None
+
+
 def square_poses(turns: Turns) -> list[Turns]:
     """Return the poses near a tilted one in which an axis of the file is down, the nearest first.
 

@@ -19,6 +19,7 @@ from chamberopt.chamber.layout.pose import (
     pose_by_size,
     propose_pose,
     square_poses,
+    upside_down,
 )
 from chamberopt.chamber.layout.shot_material import choose_shot
 from chamberopt.chamber.layout.target import (
@@ -35,7 +36,13 @@ from chamberopt.chamber.layout.turning import (
     turning_bore,
     turning_pose,
 )
-from chamberopt.chamber.propose.held_proposal import hangs_by_a_face, is_firm, is_held_thinly, rests
+from chamberopt.chamber.propose.held_proposal import (
+    hangs_by_a_face,
+    is_firm,
+    is_held_thinly,
+    nothing_holds,
+    rests,
+)
 from chamberopt.chamber.propose.placed_proposal import (
     LEAST_TOUCHED,
     NO_SPINDLE,
@@ -63,7 +70,9 @@ from chamberopt.geometry.meshes.part_mesh import PartMesh, keep_part, read_part_
 from chamberopt.geometry.triangles import rotation_matrix
 
 REACHES = 0.95  # of a part's length, from which on a target reaches both of its ends
+BY_END = "on end, as it is held by an end then, and by nothing in the pose of the best exposure"
 NOT_THIN = "so that it is held by an end of thicker metal"
+UPSIDE_DOWN = "this end down, so that the other one is held firmly"
 ASLANT = "the target faces the sonotrode aslant, so that the part itself is held firmly"
 Chooser = Callable[[Sequence[Surface]], Sequence[str]]
 
@@ -109,10 +118,20 @@ def propose(path: Path, wanted: Wanted, choose: Chooser) -> Proposal:
     if end is not None and "holder" not in made.tables:  # nothing holds the end: it is peened too
         return proposed(given, stance)
     if wanted.pose is None and end is None and not is_firm(made):
-        for turns in square_poses(stance.turns):
+        poses = [(turns, ASLANT) for turns in square_poses(stance.turns)]
+        if (over := upside_down(*shape, stance.turns)) is not None:
+            poses.insert(0, (over, UPSIDE_DOWN))
+        for turns, why in poses:
             with suppress(InputError):
-                other = proposed(given, Stance(target, turns, ASLANT))
+                other = proposed(given, Stance(target, turns, why))
                 if is_firm(other) and _is_no_worse(other, made):
+                    return other
+    if wanted.pose is None and not keeps_target and nothing_holds(made):
+        upright = pose_by_size(*shape, "standing")
+        if (tip := held_end(mesh, target, upright)) is not None:
+            with suppress(InputError):
+                other = proposed(given, Stance(target, upright, BY_END, end=tip))
+                if "holder" in other.tables and len(other.jams) <= len(made.jams):
                     return other
     if keeps_target or wanted.pose or end is not None or not hangs_by_a_face(made):
         return made

@@ -66,10 +66,14 @@ from chamberopt.design.materials import CATALOGUE, USUAL, alloy
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.surface_error import format_box
 from chamberopt.geometry.meshes.units import BY_SIZE, METRES_PER
+from chamberopt.geometry.triangles import rotation_matrix
 
 LEAST_TOUCHED = 0.02  # share of the target that balls which are wished for have to touch
 ROUNDED = 0.5e-3  # m by which sizes are rounded up
 FEW = 2  # sonotrodes side by side that are better than a room of which the part is held badly
+# Height of a target [m] above which little of the shot's energy gets to its top, by heart: a part
+# that is longer is peened a strip at a time instead of on end, where it can be.
+TALLEST = 0.3
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
 USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
 TREATMENT_S, HALF_WIDTH = 300.0, 0.03
@@ -147,7 +151,10 @@ def proposed(given: Given, stance: Stance, like: Proposal | None = None) -> Prop
     may_turn = wanted.may_turn and wanted.pose is None
     turning = turning_bore(bores, mesh, target.triangles) if may_turn else None
     is_whole = not (turning or spindle) and (end is None or end.strips is None)
-    if is_whole and not can_be_mounted(setup.shape, setup.turns, setup.ball, wanted, setup.out):
+    is_tall = wanted.pose is None and TALLEST < _height(setup) <= 1e-3 * LARGEST_MM
+    if is_whole and (
+        is_tall or not can_be_mounted(setup.shape, setup.turns, setup.ball, wanted, setup.out)
+    ):
         in_strips = _in_strips(setup)
         if in_strips is not None:
             return in_strips
@@ -180,6 +187,13 @@ def proposed(given: Given, stance: Stance, like: Proposal | None = None) -> Prop
     if spare is None or end is not None or wanted.pose is not None or not grips_poorly(made):
         return made
     return _held_by_an_end(setup, made)
+
+
+def _height(setup: _Setup) -> float:
+    """Return how high the target reaches above the part's lowest point in its pose [m]."""
+    up = setup.given.mesh.vertices @ rotation_matrix(setup.turns)[2]
+    on_target = setup.given.mesh.triangles[setup.target.triangles]
+    return float(up[on_target].max() - up.min())
 
 
 def _held_by_an_end(setup: _Setup, made: Proposal) -> Proposal:

@@ -247,7 +247,8 @@ def find_left_out(proposal: Proposal) -> list[LeftOut]:
         found.append(LeftOut(keys, f"the {share:.0%} that face away from the sonotrode ({named})"))
     hidden = 1.0 - touched_share(proposal)
     if hidden > LEAST and not part.target.reachable:
-        found.append(LeftOut({"reachable": True}, f"the {hidden:.0%} that no ball touches here"))
+        text = f"the {hidden:.0%} that no ball touches here (another pose may reach it)"
+        found.append(LeftOut({"reachable": True}, text))
     posed = proposal.chamber.part
     sharp, place = sharp_edges(posed.vertices, posed.triangles, posed.target)
     if sharp > LEAST_EDGES:

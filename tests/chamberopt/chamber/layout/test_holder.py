@@ -21,6 +21,8 @@ from chamberopt.chamber.propose.text import clauses, design_text
 from chamberopt.geometry.meshes.part_mesh import PartMesh
 from chamberopt.geometry.meshes.raw_mesh import number_by_position
 from tests.chamberopt.chamber.layout.test_grip import blade_on_root, solid
+from tests.helpers.eight_parts.surfaces import closed_tube
+from tests.helpers.mesh_files import write_stl
 
 BALL = 1e-3
 
@@ -415,3 +417,44 @@ def test_flat_sides_of_an_end_that_narrows_are_for_jaws(
     assert first.narrows
     assert ("jaws on its flat faces that look to" in first.reason) == has_jaws
     assert ("NO STRAIGHT END TO CLAMP" in first.reason) != has_jaws
+
+
+def test_a_spring_that_nothing_holds_as_it_lies_is_held_on_end(tmp_path: Path) -> None:
+    """Eight coils of 4 mm wire on 30 mm, the outer ones closed: lying, no end is one piece."""
+    angle = np.linspace(0.0, 16.0 * np.pi, 193)
+    pitch = np.interp(angle / (2.0 * np.pi), [0, 1, 1.5, 6.5, 7, 8], [4.1, 4.1, 9, 9, 4.1, 4.1])
+    rise = np.r_[0.0, np.cumsum(pitch[1:] * np.diff(angle) / (2.0 * np.pi))]
+    out = np.c_[np.cos(angle), np.sin(angle), 0.0 * angle]
+    middle = 15.0 * out + np.c_[0.0 * rise, 0.0 * rise, rise]
+    along = np.gradient(middle, axis=0)
+    up = np.cross(out, along / np.linalg.norm(along, axis=1)[:, None])
+    turn = np.linspace(0.0, 2.0 * np.pi, 13)[:-1]
+    ways = np.cos(turn)[:, None] * out[:, None] + np.sin(turn)[:, None] * up[:, None]
+    (points, triangles), _ = closed_tube(middle[:, None] + 2.0 * ways)
+    path = write_stl(tmp_path / "spring.stl", points[triangles])
+    made = propose(path, Wanted("mm", ball_mm=1.2), lambda _: [])
+    assert made.design.holder is not None
+    assert made.design.holder.kind == "collar"
+    assert "on end, as it is held by an end then" in made.reasons["part.rotate_deg"]
+
+
+def test_a_bar_that_is_too_long_to_stand_is_peened_a_strip_at_a_time(tmp_path: Path) -> None:
+    """A channel of 450 mm, of which the bottom is peened: on end little shot gets to its top."""
+    outline = [(-25, 0), (25, 0), (25, 20), (20, 20), (20, 5), (-20, 5), (-20, 20), (-25, 20)]
+    body = solid(Manifold.extrude(CrossSection([outline]), 450.0))
+    body.export(tmp_path / "channel.stl")
+    made = propose(tmp_path / "channel.stl", Wanted("mm", ball_mm=2.5), lambda _: [])
+    assert made.strips is not None
+    assert made.settings > 3
+    assert made.chamber.vertices[:, 2].max() < 0.1
+
+
+def test_a_lug_on_a_base_hangs_by_its_base(tmp_path: Path) -> None:
+    """With the base down only a rod on it, between wall and lug, would hold the part."""
+    base = Manifold.cube([50, 40, 20]).translate([-25, -20, 0])
+    lug = Manifold.cube([36, 8, 40]).translate([-18, -4, 20])
+    solid(base + lug).export(tmp_path / "lug.stl")
+    made = propose(tmp_path / "lug.stl", Wanted("mm", ball_mm=2.0), lambda _: ["face 1"])
+    assert is_firm(made)
+    assert made.design.part.rotate_deg[0] == 180.0
+    assert "this end down, so that the other one is held firmly" in made.reasons["part.rotate_deg"]
