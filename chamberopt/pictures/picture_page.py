@@ -136,8 +136,8 @@ def write_page(
         top += head + height
     if bar is not None:
         first = EDGE + heads[0]
-        middle, height = 0.5 * (first + top), min(0.85 * (top - first), 600.0)
-        _draw_bar(figure.add_axes(place(left[-1], middle - 0.5 * height, 30.0, height)), bar)
+        middle, long = 0.5 * (first + top), min(0.85 * (top - first), 600.0)
+        _draw_bar(figure.add_axes(place(left[-1], middle - 0.5 * long, 30.0, long)), bar)
     axes = figure.add_axes(place(0.0, top, across, foot), xlim=(0.0, across), ylim=(foot, 0.0))
     axes.set_axis_off()
     _draw_foot(axes, below, entries)
