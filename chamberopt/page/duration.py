@@ -14,13 +14,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from chamberopt.chamber.build import build_chamber
+from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.child import Child, ChildLostError
 from chamberopt.common.errors import InputError
 from chamberopt.common.executor import core_count
 from chamberopt.common.number_text import plain
 from chamberopt.common.toml_fields import read_toml
+from chamberopt.coverage.coverage_intervals import DENTS_FOR_PLACES
 from chamberopt.design.design import Design
 from chamberopt.design.load import is_study, load_design
 from chamberopt.design.ranges import unknowns
@@ -28,6 +29,7 @@ from chamberopt.results.load import Result, load_result
 from chamberopt.search.ask_and_tell import most_evaluations
 from chamberopt.search.study import load_study
 from chamberopt.simulation.effort import SCALES, Effort, Scale, scaled
+from chamberopt.simulation.evaluate import prepare_target
 from chamberopt.simulation.replicas import simulate_seed
 from sim_core import SceneError, SimulationError
 
@@ -44,6 +46,8 @@ MOMENT_S, TRY_S, UNSURE = 3.0, 120.0, 1.3
 AROUND_S = (7.0, 20.0)
 # Time of the ends of what is not calibrated over that of the figures, as proposals count it too.
 ENDS = 1.2
+# Of a moment that tells the rate of impacts [s]; and what is asked for over what is needed.
+LEAST_S, MARGIN = 0.02, 1.1
 AS_ASKED = "asked"
 EFFORTS: dict[str, Scale | None] = {AS_ASKED: None, **{scale: scale for scale in SCALES}}
 
@@ -102,11 +106,8 @@ def tried(path: Path, ranges: bool = True) -> dict[str, Foretold]:
         return {}
     with suppress(InputError, SceneError, SimulationError, ChildLostError), Child(TRY_S) as child:
         child.ask(_tried_pace, path)
-        pace, design = child.answer(), load_design(path)
-        return {
-            name: Foretold(_at_pace(scaled(design, scale), pace, ranges and scale != "quick"))
-            for name, scale in EFFORTS.items()
-        }
+        (pace, rate), design = child.answer(), load_design(path)
+        return {name: _by_moment(design, one, pace, rate, ranges) for name, one in EFFORTS.items()}
     return {}
 
 
@@ -114,10 +115,11 @@ class _TriedError(Exception):
     """Raised to end a simulation of which enough is known."""
 
 
-def _tried_pace(path: Path) -> float:
+def _tried_pace(path: Path) -> tuple[float, float]:
     """Return the time [s] that a simulated second of a design's replicas takes, one on each core.
 
-    It is that of all steps of a design with steps.
+    It is that of all steps of a design with steps. The second number is the rate of impacts on the
+    target [1/(m² s)], in the first step; 0 where that would take too long.
     """
     design = load_design(path)
     built = build_chamber(design)
@@ -143,7 +145,63 @@ def _tried_pace(path: Path) -> float:
     seeds = range(design.process.seed, design.process.seed + core_count())
     with ThreadPoolExecutor(len(seeds)) as threads:
         replica = max(threads.map(pace, seeds))
-    return replica * max(len(built.steps), 1) / _replica_s(design)
+    own = replica / _replica_s(one)
+    return own * max(len(built.steps), 1), _impact_rate(one, chamber, MOMENT_S / own)
+
+
+def _impact_rate(design: Design, chamber: Chamber, seconds: float) -> float:
+    """Return the impacts on the target over its area and time [1/(m² s)].
+
+    Places that are alike, as on the teeth of a gear, are dented for each other.
+
+    Args:
+        seconds: to simulate, with the warm-up; where these are too few, the rate is 0.
+    """
+    time = min(seconds - design.process.accuracy.warmup_time_s, design.process.recorded_time)
+    if time < LEAST_S:
+        return 0.0
+    short = design.changed({"process.accuracy.simulated_time_s": float(f"{time:.3g}")})
+    mesh = chamber_mesh(chamber)
+    found = simulate_seed(short, chamber, mesh, design.process.seed)
+    hits = int(chamber.on_target[found.impacts.triangle].sum())
+    area = float(chamber.exposed_area[chamber.part.target].sum())
+    alike = prepare_target(short, chamber, mesh).alike
+    return alike * hits / (area * short.process.recorded_time)
+
+
+def _by_moment(
+    design: Design, scale: Scale | None, pace: float, rate: float, ranges: bool
+) -> Foretold:
+    """Return how long an effort takes, and if it is too little, by what a moment of it told.
+
+    Not every impact leaves a dent, so that a little more may be too little.
+
+    Args:
+        pace, rate: as of `_tried_pace`.
+    """
+    taken = scaled(design, scale)
+    accuracy, few = taken.process.accuracy, ""
+    simulated = Effort.of(accuracy).most * accuracy.simulated_time_s
+    dents = rate * accuracy.gauge * simulated
+    if 0.0 < dents < DENTS_FOR_PLACES:
+        few = (
+            f"too little to tell single places: about {plain(dents, 2)} dents in each window of "
+            f"{plain(accuracy.gauge_mm2)} mm², where {DENTS_FOR_PLACES:g} would do; "
+            f"{_remedy(accuracy.simulated_time_s, scale, DENTS_FOR_PLACES / dents)}"
+        )
+    return Foretold(_at_pace(taken, pace, ranges and scale != "quick"), few)
+
+
+def _remedy(time_s: float, scale: Scale | None, times: float) -> str:
+    """Return what to do where an effort is too little.
+
+    Args:
+        time_s: its simulated time of a replica [s], of which it takes so many `times`.
+    """
+    if scale == "quick":
+        return "take more of it"
+    enough = MARGIN * times * time_s / (SCALES[scale] if scale else 1.0)
+    return f"it takes process.accuracy.simulated_time_s = {plain(float(f'{enough:.2g}'))}"
 
 
 def _at_pace(design: Design, pace: float, ranges: bool) -> str:
@@ -169,11 +227,10 @@ def _by_result(design: Design, scale: Scale | None, result: Result, ranges: bool
     accuracy, few = taken.process.accuracy, ""
     most = Effort.of(accuracy).most * accuracy.simulated_time_s
     if needed is not None and most < needed:
-        times = SCALES[scale] if scale else 1.0
-        enough = float(f"{1.1 * needed * accuracy.simulated_time_s / (most * times):.2g}")
-        remedy = f"it takes process.accuracy.simulated_time_s = {plain(enough)}"
-        few = f"too little to tell the mean coverage, by {result.folder.name}: "
-        few += "take more of it" if scale == "quick" else remedy
+        few = (
+            f"too little to tell the mean coverage, by {result.folder.name}: "
+            f"{_remedy(accuracy.simulated_time_s, scale, needed / most)}"
+        )
     return Foretold(_with_start(seconds, seconds), few)
 
 

@@ -14,6 +14,7 @@ from chamberopt.page.duration import (
     ENDS,
     UNSURE,
     _at_pace,
+    _by_moment,
     _by_result,
     _in_words,
     _whole_seconds,
@@ -21,6 +22,7 @@ from chamberopt.page.duration import (
     tried,
 )
 from chamberopt.results.load import Result
+from chamberopt.simulation.effort import Scale
 from tests.helpers.results.short_plate import plate_result
 from tests.helpers.synthetic import DESIGNS
 
@@ -97,6 +99,22 @@ def test_too_little_is_told_before_with_the_remedy(result: Result) -> None:
     assert _by_result(short, "thorough", like, ranges=False).few == ""
     enough = short.changed({f"{key}simulated_time_s": 3.3})
     assert _by_result(enough, None, like, ranges=False).few == ""
+
+
+def test_too_few_dents_are_told_by_a_moment(result: Result) -> None:
+    """At 1 impact on a mm² in a second, in windows of 2 mm²."""
+    key = "process.accuracy."
+    settings = {"replicas": 10, "simulated_time_s": 0.5, "gauge_mm2": 2.0}
+    design = result.design.changed({f"{key}{name}": one for name, one in settings.items()})
+
+    def few(scale: Scale | None) -> str:
+        return _by_moment(design, scale, 1.0, 1e6, False).few
+
+    told = "too little to tell single places: about {} dents in each window of 2 mm², where 25 "
+    assert few(None) == f"{told.format(10)}would do; it takes {key}simulated_time_s = 1.4"
+    assert few("quick") == f"{told.format('2.5')}would do; take more of it"
+    assert few("thorough") == ""
+    assert _by_moment(design, None, 1.0, 0.0, False).few == ""  # not known
 
 
 def test_nothing_is_said_of_another_part(result: Result) -> None:
