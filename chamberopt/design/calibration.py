@@ -168,9 +168,14 @@ class Calibration(FileTable):
         return self.factor("K") * 1e-3 * strength_um
 
     @property
+    def own_strips(self) -> str:
+        """What was measured in the place of whole Almen strips, such as "disc of 30 mm", or ""."""
+        return "" if not self.has_strips or self.strips == WHOLE_STRIP else self.strips
+
+    @property
     def not_mmA(self) -> str:  # noqa: N802
         """Return a note if the strips of the calibration were not whole Almen strips, else ""."""
-        if not self.has_strips or self.strips == WHOLE_STRIP:
+        if not self.own_strips:
             return ""
         return (
             f"calibration: what is called mmA is mm of arc height of a {self.strips}, with which "

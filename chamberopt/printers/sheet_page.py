@@ -577,7 +577,7 @@ def _coverage_page(
     title, (rows, columns) = "Coverage by place", picture.shape[:2]
     if under is not None and under[1] - FOOT > COVERAGE_HEAD + INNER * rows / columns:
         axes, y = under
-        y = Writer(axes, 12.0).write(title, MARGIN, y, INNER, bold=True) - 3.0
+        y = Writer(axes, 12.0).write(title, MARGIN, y - 2.0, INNER, bold=True) - 3.0
     else:
         axes, y = _further_page(title, name)
     y = Writer(axes, 7.0).write(COVERAGE, MARGIN, y, INNER) - 3.0

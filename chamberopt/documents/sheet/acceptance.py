@@ -203,14 +203,13 @@ def _intensity(result: Result, built: AsBuilt) -> str:
     wanted = intensity_text(design)
     is_told = "almen_intensity" in result.metrics
     not_by_dents = "not accepted by coverage"
-    if strip_along(design):
-        by = f"strips in the lid, {'after the times of' if is_told else 'as under'} Measure first"
+    own = design.calibration.own_strips if is_told and design.calibration else ""
+    if own or strip_along(design):
+        strips = f"a {own}, with which the machine was calibrated," if own else "strips"
+        by = f"{strips} in the lid, {'after the times of' if is_told else 'as under'} Measure first"
         if is_told:
-            return (
-                f"ACCEPT {wanted} by {by}"
-                if wanted
-                else f"no range is asked for: record it by {by}"
-            )
+            aim = f"ACCEPT {wanted}" if wanted else "no range is asked for: record it"
+            return f"{aim} by {by}"
         aim = f"ACCEPT {wanted}" if wanted else "agree on a range in mmA"
         return f"{not_by_dents}: {aim} by {by}"
     accept = f"ACCEPT {wanted}" if wanted else "ACCEPT the first part"

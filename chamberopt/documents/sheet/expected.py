@@ -193,26 +193,28 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
         yield strips, known
     else:
         text = metric_label("almen_intensity").format(intensity)
-        strips = f"intensity by A strips {_strip_times(result)}"
-        yield strips if level_mm is None else _in_the_lid(strips, design, level_mm), text
+        own = calibration.own_strips if calibration else ""
+        strips = f"intensity by {f'a {own}' if own else 'A strips'} {_strip_times(result)}"
+        yield strips if level_mm is None else _in_the_lid(strips, design, level_mm, own), text
     masses = {plain(weighed_g(one.shot), 3): None for one in design.in_steps.values()}
     yield "mass of the shot, before and after", f"{' g, then '.join(masses)} g before"
 
 
-def _in_the_lid(strips: str, design: Design, level_mm: int) -> str:
+def _in_the_lid(strips: str, design: Design, level_mm: int, own: str = "") -> str:
     """Return in words where strips are peened, or that none fits into the lid.
 
     Args:
         strips: which, and after which times.
         level_mm: that of first_checks.
+        own: what the machine was calibrated with in the place of whole strips, if so.
     """
     axis = strip_along(design)
-    if not axis:
+    if not (axis or own):
         return (
             f"intensity: no strip of {StripSize()} fits into the lid; by a small one or a coupon, "
             "as under intensity in Acceptance"
         )
-    along = " along y," if axis == "y" else ""
+    along = " along y," if axis == "y" and not own else ""
     where = f"in the lid in place of the part,{along} {level_mm} mm from the sonotrode, facing it"
     return f"{strips}; {where}"
 

@@ -134,6 +134,7 @@ def test_measured_strips_take_the_place_of_the_usual_constant() -> None:
     assert rough is not None
     assert rough.value == pytest.approx(1e-3 * USUAL_K * 15.0)
     discs = calibration(strips="disc of 40 mm")
+    assert (discs.own_strips, calibration().own_strips) == ("disc of 40 mm", "")
     assert PredictedIntensity.of(metrics, discs) is None
     assert "disc of 40 mm" in Comparison.of((0.1, 0.2), metrics, discs).predicted
 
