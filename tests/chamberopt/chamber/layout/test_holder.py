@@ -419,6 +419,7 @@ def test_flat_sides_of_an_end_that_narrows_are_for_jaws(
     assert ("NO STRAIGHT END TO CLAMP" in first.reason) != has_jaws
 
 
+@pytest.mark.long
 def test_a_spring_that_nothing_holds_as_it_lies_is_held_on_end(tmp_path: Path) -> None:
     """Eight coils of 4 mm wire on 30 mm, the outer ones closed: lying, no end is one piece."""
     angle = np.linspace(0.0, 16.0 * np.pi, 193)
