@@ -214,8 +214,13 @@ def _most_frequent(reasons: Sequence[str]) -> str:
     for one in reasons:
         alike.setdefault(re.sub(r"[-−\d.,()]+", "", one), []).append(one)
     most = max(alike.values(), key=len)
-    text = most[0].removeprefix("not simulated: ")
+    text = why_refused(most[0])
     return f"For {len(most)} of {len(reasons)} refusals it is the same reason, as: {text}."
+
+
+def why_refused(reason: str) -> str:
+    """Return a candidate's reason for where it is told that it was not simulated."""
+    return reason.removeprefix("not simulated: ")
 
 
 def evaluated(one: Trial, label: Label) -> EvaluatedCandidate:

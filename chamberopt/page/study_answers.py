@@ -15,7 +15,7 @@ from chamberopt.common.key_words import title_with_unit
 from chamberopt.common.limits import MAX_RESULT_BYTES, require_size
 from chamberopt.coverage.metrics import parse_objective
 from chamberopt.design.design import Design
-from chamberopt.documents.study import evaluated, reason_without_model, tried_sentence
+from chamberopt.documents.study import evaluated, reason_without_model, tried_sentence, why_refused
 from chamberopt.documents.wanted import enough_time
 from chamberopt.documents.wording import Label, metric_label, objective_label, per_cent
 from chamberopt.page.page_words import on_page
@@ -79,7 +79,7 @@ def candidates_answer(folder: Path) -> dict[str, object]:
             "feasible": one.feasible,
             "objective": _interval(one.objective),
             "told": labels[0].number(trial.goals[0]) if trial.goals else "",
-            "reason": on_page(trial.reason),
+            "reason": on_page(why_refused(trial.reason)),
             "second": _interval(_second(trial, labels)),
             "values": one.parameters,
         }
@@ -166,7 +166,7 @@ def candidate_answer(folder: Path, number: int, design: Design) -> dict[str, obj
     return {
         "number": number,
         "kind": _kind(trial),
-        "reason": on_page(trial.reason),
+        "reason": on_page(why_refused(trial.reason)),
         "values": values,
         "numbers": [(title_with_unit(name), str(one)) for name, one in values.items()],
         "figures": list(dict(figures).items()),
