@@ -29,8 +29,8 @@ const ALONG = { box: null, width: [1, 0, 0], depth: [0, 1, 0], height: [0, 0, 1]
 export const DIMENSIONS = Object.keys(ALONG).flatMap((name) => [name, `${name}, lines`]);
 export const short = (x) => String(Number(x.toPrecision(4)));
 
-// Sizes of the chamber and the part's height over the sonotrode, and the part's box.
-export function drawDimensions(view, { shape, shape_mm: [low, high], part_mm: [a, b], distance_mm }) {
+// Sizes of the chamber and the part's height over the sonotrode, and the part's box, beside what is seen first: from `way` on.
+export function drawDimensions(view, { shape, shape_mm: [low, high], part_mm: [a, b], distance_mm, way }) {
   const size = Math.hypot(...high.map((x, i) => x - low[i]));
   const gap = 0.06 * size;
   const ends = [];
@@ -44,19 +44,22 @@ export function drawDimensions(view, { shape, shape_mm: [low, high], part_mm: [a
   // So high that it is over the part's farther edge too, as seen from 20 degrees above.
   const above = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), b[2] + 0.04 * size + 0.3 * Math.min(b[0] - a[0], b[1] - a[1])];
   show("box", ends, [["part " + b.map((x, i) => short(x - a[i])).join(" × ") + " mm", above]]);
-  const across = high[1] - low[1], isRound = shape !== "box" && Math.abs(high[0] - low[0] - across) < 1e-3 * size;
+  const wide = high[0] - low[0], across = high[1] - low[1], isRound = shape !== "box" && Math.abs(wide - across) < 1e-3 * size;
   const sign = shape === "cylinder" ? "⌀ " : "";
-  show("width", dimension([low[0], low[1], 0], [high[0], low[1], 0], [0, -gap, 0], size),
-    [[`${sign}${short(high[0] - low[0])} mm`, [0.5 * (low[0] + high[0]), low[1] - gap, -0.4 * gap]]]);
-  show("depth", isRound ? [] : dimension([low[0], low[1], 0], [low[0], high[1], 0], [-gap, 0, 0], size),
-    isRound ? [] : [[`${short(across)} mm`, [low[0] - gap, 0.5 * (low[1] + high[1]), -0.4 * gap]]]);
+  // The sides at which the eye is not in x, and is in y; gaps go outward there.
+  const isRight = way[0] >= 0, isFront = way[1] <= 0;
+  const x0 = isRight ? low[0] : high[0], x1 = low[0] + high[0] - x0, right = isRight ? gap : -gap;
+  const y0 = isFront ? low[1] : high[1], y1 = low[1] + high[1] - y0, front = isFront ? -gap : gap;
+  show("width", dimension([x0, y0, 0], [x1, y0, 0], [0, front, 0], size), [[`${sign}${short(wide)} mm`, [0.5 * (x0 + x1), y0 + front, -0.4 * gap]]]);
+  show("depth", isRound ? [] : dimension([x0, y0, 0], [x0, y1, 0], [-right, 0, 0], size),
+    isRound ? [] : [[`${short(across)} mm`, [x0 - right, 0.5 * (y0 + y1), -0.4 * gap]]]);
   // What of the part is outside of the walls may be lower: then the distance is at an edge of the chamber.
   const set = Number(distance_mm ?? a[2]), isOwn = Math.abs(set - a[2]) < 0.05;
-  const [x, y] = isOwn ? [b[0], a[1]] : [low[0], low[1]];
-  const side = isRound ? 0.5 * (low[1] + high[1]) : high[1];
-  show("height", [...dimension([high[0], side, 0], [high[0], side, high[2]], [gap, 0, 0], size),
+  const [x, y] = isOwn ? [isRight ? b[0] : a[0], isFront ? a[1] : b[1]] : [x0, y0];
+  const side = isRound ? 0.5 * (y0 + y1) : y1;
+  show("height", [...dimension([x1, side, 0], [x1, side, high[2]], [right, 0, 0], size),
     ...dimension([x, y, 0], [x, y, set], [0, 0, 0], size)],
-  [[`height ${short(high[2])} mm`, [high[0] + gap, side, 0.8 * high[2]]], [`distance ${short(set)} mm`, [x, y, 0.5 * set]]]);
+  [[`height ${short(high[2])} mm`, [x1 + right, side, 0.8 * high[2]]], [`distance ${short(set)} mm`, [x, y, 0.5 * set]]]);
 }
 
 // Ends of the lines of a dimension between two places: arrows, aside by a way, and a line from each place to its arrow.
