@@ -36,6 +36,7 @@ ALIKE_CAPTION = "the target, alike from the other side"
 ABOVE = 1e-3  # height over the surface from which a place is looked for, over the part's size
 MARK = 30.0  # pixels between texts, and from the edge of a view
 ALIKE = 3.0  # mean difference of two images, of 255, up to which they show the same
+LEVEL = 1e-3  # mm by which the corners of a ceiling may lie below the highest point
 
 Add = Callable[[Any], None]
 """Puts something into a plotter."""
@@ -211,9 +212,10 @@ def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:
 def _walls_end(chamber: Surface) -> float:
     """Return the height [mm] at which walls end: at the ceiling, or on a part just below it."""
     faces, tag = np.asarray(chamber.regular_faces), np.asarray(chamber["tag"])
-    shared = np.intersect1d(faces[tag == TAG_PART], faces[tag == TAG_WALL])
-    high = float(chamber.bounds[5])
-    heights = np.asarray(chamber.points)[shared, 2]
+    high, heights = float(chamber.bounds[5]), np.asarray(chamber.points)[:, 2]
+    if (heights[faces[tag == TAG_WALL]] > high - LEVEL).all(axis=1).any():
+        return high  # there is a ceiling beside the part
+    heights = heights[np.intersect1d(faces[tag == TAG_PART], faces[tag == TAG_WALL])]
     return float(min(heights[heights > high - EDGE * MM], default=high))
 
 

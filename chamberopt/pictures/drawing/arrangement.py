@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _STEPS = np.outer(10.0 ** np.arange(4), (1.0, 2.0, 5.0)).ravel()  # ISO 5455
 SCALES = np.concatenate([_STEPS[::-1], 1.0 / _STEPS[1:]])  # from large to small
 # Room on paper [mm] round a view for its dimensions: left and right, above, below.
-BESIDE, ABOVE, BELOW = 11.0, 9.0, 12.0
+BESIDE, ABOVE, BELOW = 11.0, 10.5, 12.0
 FACE = 2.5  # mm on paper, thickness of the drawn sonotrode
 WALL = 1.5  # mm on paper, thickness of the drawn walls, whatever it will be
 # Of what is drawn of a part beside the chamber: how many lengths are tried, and how thick it is at

@@ -10,7 +10,7 @@ from matplotlib.image import imread
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import load_design
-from chamberopt.pictures.panels import ALIKE_CAPTION, without_twin
+from chamberopt.pictures.panels import ALIKE_CAPTION, chamber_dimensions, without_twin
 from chamberopt.pictures.part import (
     CLEAR,
     HELD,
@@ -24,6 +24,7 @@ from chamberopt.pictures.part import (
 from chamberopt.pictures.picture_page import Panel
 from chamberopt.pictures.view import View
 from chamberopt.results.vtp_files import MM, cavity_surface
+from tests.chamberopt.chamber.checks.test_openings import chamber_of
 from tests.helpers.opengl import needs_opengl
 
 
@@ -77,6 +78,17 @@ def test_each_pose_of_a_part_has_a_view_in_the_chamber(tmp_path: Path) -> None:
     assert draw_target(design, chamber, tmp_path / "design.png") == (
         f"picture in {tmp_path / 'design.png'}"
     )
+
+
+def test_the_height_ends_at_a_ceiling_beside_a_part_that_goes_out_just_below_it(
+    tmp_path: Path,
+) -> None:
+    """A bar goes out through two walls 40 mm high, its top 0.3 mm below their ends."""
+    bar = trimesh.creation.box((100.0, 20.0, 24.7))
+    cavity = cavity_surface(chamber_of(tmp_path, bar))
+    texts = [one.text for one in chamber_dimensions(cavity, np.array([0.5, -0.8, 0.3]))]
+    assert "40 mm" in texts
+    assert "39.7 mm" not in texts
 
 
 def test_a_part_is_drawn_only_where_there_can_be_such_a_file(tmp_path: Path) -> None:
