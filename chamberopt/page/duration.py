@@ -228,7 +228,7 @@ def _by_result(design: Design, scale: Scale | None, result: Result, ranges: bool
     most = Effort.of(accuracy).most * accuracy.simulated_time_s
     if needed is not None and most < needed:
         few = (
-            f"too little to tell the mean coverage, by {result.folder.name}: "
+            f"too little to tell the mean coverage, as the result {result.folder.name} shows: "
             f"{_remedy(accuracy.simulated_time_s, scale, needed / most)}"
         )
     return Foretold(_with_start(seconds, seconds), few)

@@ -93,7 +93,7 @@ def test_too_little_is_told_before_with_the_remedy(result: Result) -> None:
     key = "process.accuracy."
     short = result.design.changed({f"{key}replicas": 10, f"{key}simulated_time_s": 2.0})
     few = _by_result(short, None, like, ranges=False).few
-    told = "too little to tell the mean coverage, by result: "
+    told = "too little to tell the mean coverage, as the result result shows: "
     assert few == f"{told}it takes process.accuracy.simulated_time_s = 3.3"
     assert _by_result(short, "quick", like, ranges=False).few == f"{told}take more of it"
     assert _by_result(short, "thorough", like, ranges=False).few == ""
