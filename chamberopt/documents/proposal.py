@@ -216,6 +216,8 @@ def _sentence(made: Proposal) -> str:
     target = _in_short(one_line(_target(made)))
     if target == BEVELS:
         target = f"the welds ({target})"
+    if beside_mm := design.part.target.beside_mm:
+        target += f" and {plain(beside_mm)} mm beside them"
     return (
         f"Peen {target} ({area}{strips}) of "
         f"{one_line(design.part.mesh_path.name)} for {_time(made)} with {balls}, the sonotrode at "

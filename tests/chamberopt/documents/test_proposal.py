@@ -54,6 +54,11 @@ def test_only_bevels_are_called_welds(made: Proposal, name: str, told: str) -> N
     assert proposal_in_words(of_it, []).sentence.startswith(f"Peen {told} (")
 
 
+def test_the_area_of_a_target_says_what_it_takes_beside_its_faces(made: Proposal) -> None:
+    given = replace(made, design=made.design.changed({"part.target.beside_mm": 2.0}))
+    assert " and 2 mm beside them (" in proposal_in_words(given, []).sentence
+
+
 @pytest.mark.parametrize("room", [1e6, 20.0, 4.0])
 def test_what_no_pilot_measured_stays_within_a_modest_memory_too(
     made: Proposal, room: float
