@@ -79,14 +79,15 @@ function dimension(from, to, aside, size) {
 // `answer` gives the triangles of the surface that `named` names, or what the server answers of them.
 export function lights(named, view, answer, colour) {
   let isOn = false, found = null;
+  const isChosen = () => named.querySelector(":checked") && !view.get("walls"); // it stays lit with all that is chosen, until a chamber shows it as its target
   const show = () => attempt(async () => {
     isOn = true;
     const told = found ?? await answer();
     found = told instanceof ArrayBuffer ? unpack(told).triangles : told;
-    if (isOn) view.highlight("part", found, colour());
+    if (isOn && !isChosen()) view.highlight("part", found, colour());
   });
   const hide = () => {
-    if (named.querySelector(":checked") && !view.get("walls")) return; // what is chosen stays lit, until a chamber shows it as its target
+    if (isChosen()) return;
     isOn = false;
     view.highlight("part", null);
   };
