@@ -10,6 +10,10 @@ comes from products of S in two disjoint halves of the batches, whose scatter is
 Percentiles are moved towards the mean until S varies over the target as the true strength does.
 Halves and quarters of the batches show how much a result changes with few dents. The step from
 halves to all batches is made once more, and the interval includes this step times OF_STEP.
+
+Where the dents are too few for that, S of the windows is too small, and that of all dents together
+as if they lay in one window is usually too large, as places that are hit little count little in it.
+The mean strength is then the middle between the two, and its bias half of what lies between.
 """
 
 from __future__ import annotations
@@ -231,7 +235,27 @@ def estimates_of(found: StrengthHistograms, reach: Reach) -> dict[str, Estimate]
     if mean.bias > MAX_STEP * mean.value:
         for name in estimates.keys() - {"intensity_uniformity"}:
             estimates[name] = replace(estimates[name], half_width=math.inf)
+        estimates["strength_um"] = _between(mean, _in_one_window(total, found.highest))
     return estimates
+
+
+def _between(in_windows: Estimate, in_one: float) -> Estimate:
+    """Return a strength without an interval that lies between those of windows and of one window.
+
+    Its bias reaches to both.
+    """
+    middle = 0.5 * (in_windows.value + in_one)
+    return replace(in_windows, value=middle, bias=abs(in_one - middle), half_width=math.inf)
+
+
+def _in_one_window(total: np.ndarray, highest: float) -> float:
+    """Return the peening strength [µm] if the dents of all windows lay in one.
+
+    Args:
+        total: dented area over area of each window, by level of strength, (p, LEVELS).
+    """
+    rate = dent_rates(total.mean(axis=0)[None])
+    return MICROMETRES * float(strength_at(rate, saturation_time(rate), highest)[0])
 
 
 def _saturated(found: StrengthHistograms, some: np.ndarray) -> Saturated:

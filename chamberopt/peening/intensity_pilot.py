@@ -20,7 +20,6 @@ from chamberopt.common.progress import Progress
 from chamberopt.coverage.strength_intervals import MAX_STEP
 from chamberopt.design.intensity import PredictedIntensity
 from chamberopt.peening.calibration_errors import evaluate_calibrated
-from chamberopt.simulation.budget_pilot import rough_intensity
 from chamberopt.simulation.evaluate import ReplicaPlan, evaluate
 from chamberopt.simulation.replicas import ReplicaSet
 
@@ -68,7 +67,7 @@ def predict_intensity(
             break
         time *= GROWTH
     if not _is_known(wide, math.inf):
-        rough = rough_intensity(short, chamber, executor, list(known.replicas))
+        rough = PredictedIntensity.of(wide.metrics, design.calibration)
         return None if rough is None else IntensityPilot(rough, 0.0)
     found, dents = wide, _dents_needed(wide)
     narrow = short.process.accuracy.gauge_mm2 * dents / wide.resolution.dents

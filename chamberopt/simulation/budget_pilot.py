@@ -60,7 +60,6 @@ FEW = 40.0  # dents in the median of the narrowest windows; 25 are needed (propo
 # for a shot that still slows down, the third where poses are not told apart otherwise.
 COLLISIONS, UNSETTLED, LONGER = 2e6, 8e6, 8e6
 ENOUGH = 30  # dents from which on they bound the time to 98 %
-ROUGH = 0.2  # share of the target in windows that tell an intensity roughly
 
 
 def _least_time(squares: float, hits: int, area_time: float) -> float:
@@ -191,10 +190,6 @@ def measure_budget(
     if not dents or not mean > 0.0:
         raise InputError(f"the shot hardly hits the target in {simulated:.3g} simulated s")
     resolved = _resolved(found)
-    if wide.metrics["strength_um"].in_words:
-        intensity = rough_intensity(slow, chamber, executor, replicas)
-    else:
-        intensity = PredictedIntensity.of(wide.metrics, design.calibration)
     mean_time = slow.process.treatment_time / mean
     return Measured(
         room=modest_time(design, chamber),
@@ -210,7 +205,7 @@ def measure_budget(
         mean_time=mean_time,
         warmup=warmup,
         settled=settled,
-        intensity=intensity,
+        intensity=PredictedIntensity.of(wide.metrics, design.calibration),
     )
 
 
@@ -219,22 +214,6 @@ def modest_time(design: Design, chamber: Chamber) -> float:
     usual = design.changed({"process.accuracy.gauge_mm2": 1.0})
     counts = FEWEST, max(FEWEST, design.process.accuracy.max_replicas)
     return min(time_within(1e9 * MODEST_GB, usual, chamber, count) for count in counts)
-
-
-def rough_intensity(
-    design: Design, chamber: Chamber, executor: Executor, replicas: list[Replica]
-) -> PredictedIntensity | None:
-    """Return the Almen intensity in windows of a fifth of the target, which takes few dents.
-
-    It is None if there are hardly any, or if strips were measured: their intensity is not told
-    roughly.
-    """
-    if design.calibration is not None:
-        return None
-    gauge = ROUGH * 1e6 * float(chamber.part.area[chamber.part.target].sum())
-    wide = design.changed({"process.accuracy.gauge_mm2": max(1.0, gauge)})
-    strength = _seen(wide, chamber, executor, replicas).metrics["strength_um"]
-    return PredictedIntensity.roughly(strength)
 
 
 def _seen(

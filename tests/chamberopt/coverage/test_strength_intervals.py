@@ -160,6 +160,19 @@ def test_scatter_of_counts_moves_no_percentile() -> None:
         assert found[name].half_width < 0.1 * mean.value
 
 
+@pytest.mark.parametrize("per_mm2", [0.02, 0.06, 0.15])
+def test_with_few_dents_the_strength_lies_between_that_of_windows_and_of_one(
+    per_mm2: float,
+) -> None:
+    """Each half of the plane comes to 0.9 of its strength, whatever its dents are."""
+    rng, field = np.random.default_rng(11), plane_field()
+    found = figures(field, [[plane_dents(rng, per_mm2, None)] for _ in range(8)])["strength_um"]
+    true = 0.9e6 * 0.5 * (1.0 + WEAK) * 0.2e-3**2 / BALL
+    assert found.half_width == np.inf
+    assert 0.0 < found.bias < found.value
+    assert abs(found.value - true) < found.bias
+
+
 def test_twice_the_simulated_time_saturates_in_twice_the_time() -> None:
     strip, density = strip_material(DESIGN.shot), DESIGN.shot.density
     rng, field = np.random.default_rng(10), plane_field()

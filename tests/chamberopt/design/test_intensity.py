@@ -12,9 +12,9 @@ from chamberopt.design.calibration import Calibration
 from chamberopt.design.intensity import (
     INCH_MM,
     INSIDE,
+    MOST_BIAS,
     NOT_DECIDED,
     OUTSIDE,
-    ROUGH_LOG_SD,
     THICK_MM,
     THIN_MM,
     Comparison,
@@ -164,7 +164,7 @@ def test_the_whole_interval_decides(value: float, half_width: float, standing: s
         Estimate(20.0, math.inf),
         Estimate(20.0, 1.0, in_words="x"),
         Estimate(0.0, 0.0),
-        Estimate(20.0, math.inf, bias=1.01 * ROUGH_LOG_SD * 20.0, in_words=NOT_RESOLVED),
+        Estimate(20.0, math.inf, bias=1.01 * MOST_BIAS * 20.0, in_words=NOT_RESOLVED),
         Estimate(20.0, math.inf, in_words=NOT_RESOLVED),  # of so few replicas that none is known
     ],
 )
@@ -176,7 +176,7 @@ def test_no_intensity_is_made_of_a_strength_that_is_not_known(strength: Estimate
 
 
 def test_a_strength_that_is_not_resolved_tells_the_intensity_roughly() -> None:
-    """Its logarithm is known to ROUGH_LOG_SD, and that of the usual constant to its own."""
+    """Its bias is as a half-width, beside what is known of the usual constant."""
     resolved = PredictedIntensity.of({"strength_um": Estimate(20.0, 0.0)}, None)
     unresolved = Estimate(20.0, math.inf, bias=1.0, in_words=NOT_RESOLVED)
     found = PredictedIntensity.of({"strength_um": unresolved}, None)
@@ -184,7 +184,7 @@ def test_a_strength_that_is_not_resolved_tells_the_intensity_roughly() -> None:
     assert found is not None
     assert found.value == resolved.value
     log_sd = math.log(found.factor)
-    assert log_sd**2 == pytest.approx(math.log(resolved.factor) ** 2 + ROUGH_LOG_SD**2)
+    assert log_sd**2 == pytest.approx(math.log(resolved.factor) ** 2 + (1.0 / 20.0 / 1.96) ** 2)
     assert math.log(found.high / found.low) == pytest.approx(2.0 * 1.96 * log_sd)
 
 
