@@ -10,6 +10,7 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
 from typing import Any, Literal, ParamSpec, TypeVar
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.memory import keep_few_heaps
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -48,6 +49,7 @@ def local_executor(workers: int | None = None, kind: WorkerKind = "threads") -> 
         raise InputError(f"--workers: given {workers}; {remedy}")
     count = workers or core_count()
     if kind == "threads":
+        keep_few_heaps()
         return ThreadExecutor(count, thread_name_prefix="replica")
     from chamberopt.common.processes import ProcessExecutor
 

@@ -1,7 +1,8 @@
-"""Tell how much memory is free, and keep account of arrays that are only kept for speed."""
+"""Tell how much memory is free, take less of it, and account for arrays kept only for speed."""
 
 from __future__ import annotations
 
+import ctypes
 import math
 import os
 import sys
@@ -21,6 +22,21 @@ FILES = {
     "": ("memory.max", "memory.current"),
     "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes"),
 }
+M_ARENA_MAX, HEAPS = -8, 2  # parameter of the GNU C library's mallopt(3), and its value
+
+
+def keep_few_heaps() -> bool:
+    """Let all threads of this process allocate from HEAPS heaps; return whether they will.
+
+    The GNU C library gives each thread its own, and what a thread freed there the others cannot
+    use: a study of 8 calibrated gears took 1.7 to 1.9 GB, and takes 1.3. Other C libraries have no
+    such setting, and MALLOC_ARENA_MAX is the user's.
+    """
+    if sys.platform != "linux" or "MALLOC_ARENA_MAX" in os.environ:
+        return False
+    with suppress(AttributeError, OSError):
+        return bool(ctypes.CDLL(None).mallopt(M_ARENA_MAX, HEAPS))
+    return False
 
 
 def free_memory() -> float:
