@@ -11,7 +11,7 @@ import re
 UNITS = {
     "mm": "mm", "mm2": "mm²", "cm3": "cm³", "um": "µm", "deg": "degrees", "khz": "kHz", "hz": "Hz",
     "mg": "mg", "g": "g", "kg_m3": "kg/m³", "m_s": "m/s", "mm_s": "mm/s", "s": "s", "ms": "ms",
-    "HB": "HB", "MPa": "MPa", "GPa": "GPa", "share": "%",
+    "HB": "HB", "MPa": "MPa", "GPa": "GPa", "share": "%", "rpm": "rpm",
 }  # fmt: skip
 # What a study is after, by the name of its objective.
 AIMS = {
@@ -54,7 +54,7 @@ BARE = "|".join(key for key in KEYS if "." not in key)
 # A key or a table of a file in a text, in the patterns of the texts that have them.
 KEY = rf"\[(?:{TABLES})\]|\[{DOTTED}\]|(?<![\w./])(?:{DOTTED}|(?:{BARE})\b)"
 _ITEM = re.compile(r"\.([012])$")
-_UNIT = re.compile(rf"_({'|'.join(sorted(UNITS, key=len, reverse=True))})$")
+_UNIT = re.compile(rf"(?:_|\.(?=rpm))({'|'.join(sorted(UNITS, key=len, reverse=True))})$")
 _ALONG = re.compile(r"(?:deg|mm|axis)\.([012])$")  # along x, y and z
 
 
@@ -83,8 +83,10 @@ def title(name: str) -> str:
 
     >>> title("part.offset_mm.0")
     'Part offset, x'
+    >>> title("effects.part_turn.rpm")
+    'Part turn'
     """
-    words = in_words(name)
+    words = in_words(name.removeprefix("effects."))
     words = words[:1].upper() + words[1:] if words[:3].isalpha() else words  # a symbol stays
     along = _ALONG.search(name)
     return f"{words}, {'xyz'[int(along[1])]}" if along else words

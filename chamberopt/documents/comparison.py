@@ -242,4 +242,6 @@ def _times(times: float) -> str:
 
 
 def _shown(value: object) -> str:
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_shown, value))
     return "-" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

@@ -356,6 +356,14 @@ def test_what_cannot_be_compared(tmp_path: Path) -> None:
     compare([one, machines[0]])
 
 
+def test_numbers_that_differ_are_told_in_words(tmp_path: Path) -> None:
+    posed = plate(part__rotate_deg=[0, 0, 90], effects__part_turn={"rpm": 12.5})
+    both = compare([left(tmp_path / "a", 60), left(tmp_path / "b", 60, design=posed)])
+    text = terminal.text(comparison_end(both, False))
+    assert row(text, "Part rotate [degrees]").split()[-3:] == ["0,", "0,", "90"]
+    assert row(text, "Part turn [rpm]").split()[-2:] == ["-", "12.5"]
+
+
 @pytest.mark.parametrize("names", [("b",), ("b", "c")])
 def test_the_end_is_a_sentence_for_each_and_the_main_figures_in_words(
     tmp_path: Path, names: tuple[str, ...]
