@@ -65,7 +65,12 @@ class Gaps(NamedTuple):
     widest: float  # width up to which gaps are measured [m]
 
 
-def find_gaps(chamber: Chamber, diameters: Sequence[float], beside_walls: bool = False) -> Gaps:
+def find_gaps(
+    chamber: Chamber,
+    diameters: Sequence[float],
+    beside_walls: bool = False,
+    widest: float = MEASURED_WIDTH,
+) -> Gaps:
     """Measure the gaps of a chamber for balls of some diameters [m], in a fraction of a second.
 
     It is not found whether a ball gets there at all, for which `shot_reach` takes seconds.
@@ -73,8 +78,9 @@ def find_gaps(chamber: Chamber, diameters: Sequence[float], beside_walls: bool =
     Args:
         beside_walls: whether only gaps beside walls and sonotrode are wanted, not those of the part
             alone. They are measured from the walls: a ball between both faces touches both.
+        widest: widest gap that is measured, over the largest diameter.
     """
-    limit, mesh = MEASURED_WIDTH * 0.5 * max(diameters), chamber_mesh(chamber)
+    limit, mesh = widest * 0.5 * max(diameters), chamber_mesh(chamber)
     chosen = normals = None
     if beside_walls:  # which are as their facets
         chosen = mesh.tags != TAG_PART
