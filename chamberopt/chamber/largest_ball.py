@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chamberopt.geometry.triangles import EVEN_STEP, areas, interpolate, on_triangles, unit_vectors
+from chamberopt.geometry.triangles import (
+    EVEN_STEP,
+    area_vectors,
+    areas,
+    interpolate,
+    on_triangles,
+    unit_vectors,
+)
 
 if TYPE_CHECKING:
     from sim_core import TriangleMesh
@@ -63,6 +70,18 @@ def find_touch_points(
     own = triangle[bent]
     normal[bent] = unit_vectors(interpolate(normals[own], mesh.corners[own], point[bent]))
     balls = largest_balls(mesh, point, normal, max_radius, overlap)
+    # The surface of a convex round lies above its facets. Where the normal leans so far from a
+    # coarse facet that a ball on it would dip into the facet itself, the ball may also stand
+    # upright on the facet, as it does in the simulation. In a hollow, that ball is the smaller one.
+    flat = unit_vectors(-area_vectors(mesh.vertices, mesh.triangles[own]))
+    dip = max_radius * (1.0 - np.einsum("ij,ij->i", normal[bent], flat))
+    leans = (dip > overlap) & (balls[0][bent] < max_radius)
+    upright, flat = bent[leans], flat[leans]
+    of_flat = largest_balls(mesh, point[upright], flat, max_radius, overlap)
+    wider = of_flat[0] > balls[0][upright]
+    normal[upright[wider]] = flat[wider]
+    for old, new in zip(balls, of_flat, strict=True):
+        old[upright[wider]] = new[wider]
     return TouchPoints(triangle, point, normal, area, *balls)
 
 

@@ -143,6 +143,9 @@ class StepRoom(NamedTuple):
 def ball_fits(mesh: Rooms, place: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
     """Return for each point on the surface of the cavity whether a ball can touch it, (p,) bool.
 
+    A ball touches the point along the surface's normal, or upright on the facet under it. Along a
+    normal that leans far from a coarse convex facet, a ball would dip into that facet.
+
     Args:
         mesh: the surface of the cavity; or the cavities of several steps, each with its balls, of
             which a ball must touch the point in one.
@@ -158,6 +161,20 @@ def ball_fits(mesh: Rooms, place: np.ndarray, normal: np.ndarray, radius: float)
             at, out = place[~fits] @ room.turn.T + room.shift, normal[~fits] @ room.turn.T
             fits[~fits] = ball_fits(room.mesh, at, out, room.ball)
         return fits
+    fits = _is_clear(mesh, place, normal, radius)
+    rows = np.flatnonzero(~fits)
+    own = closest_points(mesh, place[rows], ON_SURFACE * radius).triangle
+    rows, own = rows[own >= 0], own[own >= 0]
+    fits[rows] = _is_clear(mesh, place[rows], -unit_normals(mesh.corners[own]), radius)
+    return fits
+
+
+def _is_clear(
+    mesh: TriangleMesh, place: np.ndarray, normal: np.ndarray, radius: float
+) -> np.ndarray:
+    """Return for each point whether a ball fits that touches it along the normal, (p,) bool."""
+    from sim_core import closest_points
+
     found = closest_points(mesh, place + radius * normal, radius * (1.0 + 1e-6))
     fits = (found.triangle >= 0) & (found.distance >= radius * (1.0 - TOLERATED_OVERLAP))
     # Another spot of the surface may be nearer, also to a place outside the cavity.

@@ -1,5 +1,6 @@
 """The reach of a ball agrees with closed forms, and no impact falls out of its reach."""
 
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,10 +16,11 @@ from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.part import Part
 from chamberopt.chamber.reach import TOLERATED_OVERLAP, Reach, find_reach, reached_part_share
 from chamberopt.chamber.scene import build_scene, chamber_mesh
+from chamberopt.coverage.field.surface_points import ball_fits
 from chamberopt.design.load import load_design
 from chamberopt.design.shapes import TAG_PART, TAG_SONOTRODE, TAG_WALL
-from chamberopt.geometry.triangles import area_vectors, areas
-from sim_core import largest_balls, simulate
+from chamberopt.geometry.triangles import area_vectors, areas, unit_normals, unit_vectors
+from sim_core import TriangleMesh, largest_balls, simulate
 
 DESIGNS = Path(__file__).resolve().parents[3] / "designs"
 BALL = 3e-3
@@ -166,6 +168,70 @@ def test_a_round_groove_is_touched_if_it_is_rounder_than_the_ball(radius: float)
     assert 1e6 * found.touches.area[own].sum() == pytest.approx(whole, rel=0.03)
     expected = (20.0 - 3.0 * (1.0 - TOLERATED_OVERLAP)) / 20.0 if radius > 1.5 else 0.0
     assert reached_area_mm2(found, own) / whole == pytest.approx(expected, abs=0.02)
+
+
+def rounded(sides: int, radius_mm: float, high_mm: float) -> trimesh.Trimesh:
+    """A regular prism along y from 0 to 20 mm, whose axis is so high."""
+    angle = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
+    return prism([(radius_mm * np.cos(a), high_mm + radius_mm * np.sin(a)) for a in angle], 20.0)
+
+
+def with_round_normals(
+    whole: trimesh.Trimesh, high_mm: float, sign: float
+) -> tuple[TriangleMesh, np.ndarray, Callable[[np.ndarray], np.ndarray]]:
+    """A cavity, its normals, and the round normal at points of it.
+
+    The normals are round on the facets less than 4 mm from the axis of a prism.
+
+    Args:
+        sign: 1 for normals that point away from the axis, -1 for the others.
+    """
+    vertices, triangles = 1e-3 * np.asarray(whole.vertices), np.asarray(whole.faces)
+    sonotrode = (vertices[triangles][..., 2] < 1e-9).all(axis=1)
+    tags = np.where(sonotrode, TAG_SONOTRODE, TAG_PART).astype(np.uint8)
+    mesh = TriangleMesh(vertices, triangles, tags)
+
+    def off_axis(points: np.ndarray) -> np.ndarray:
+        return np.asarray(sign * (points - (0.0, 0.0, 1e-3 * high_mm)) * (1.0, 0.0, 1.0))
+
+    flat = np.repeat(-unit_normals(mesh.corners)[:, None], 3, axis=1)
+    off = off_axis(mesh.corners)
+    is_round = (np.linalg.norm(off, axis=2) < 4e-3).all(axis=1) & (np.abs(flat[:, 0, 1]) < 0.5)
+    normals = np.where(is_round[:, None, None], unit_vectors(off), flat)
+    return mesh, normals, lambda points: unit_vectors(off_axis(points))
+
+
+@pytest.mark.parametrize("sides", [15, 90])
+def test_a_convex_edge_of_coarse_facets_is_touched_all_over(sides: int) -> None:
+    """Normals of the round surface lean by 12 degrees from the coarse facets at their sides.
+
+    A ball along them would dip into its own facet by 2 % of its radius, though nothing is in the
+    way. Balls reach all of the column but for its two ends, by their radius.
+    """
+    ball = 1e-3  # less than the facets' width, so that its lowest point is over its own facet
+    whole = ROOM.difference(rounded(sides, 1.0, 5.0), engine="manifold")
+    mesh, normals, smooth = with_round_normals(whole, 5.0, 1.0)
+    found = find_reach(mesh, ball, normals=normals)
+    touches = found.touches
+    own = (normals != normals[:, :1]).any(axis=(1, 2))[touches.triangle]
+    share = touches.area[own & found.reached].sum() / touches.area[own].sum()
+    assert share == pytest.approx((20.0 - 1.0 + TOLERATED_OVERLAP) / 20.0, abs=0.01)
+    middle = own & (np.abs(touches.point[:, 1] - 10e-3) < 8e-3)
+    assert found.reached[middle].all()
+    assert ball_fits(mesh, touches.point[middle], smooth(touches.point[middle]), 0.5 * ball).all()
+
+
+@pytest.mark.parametrize("sides", [16, 90])
+def test_a_hollow_of_coarse_facets_sharper_than_the_ball_is_not_touched(sides: int) -> None:
+    """Half round, and open below: no ball gets in along the round normals nor along the facets'."""
+    whole = trimesh.boolean.union([ROOM, rounded(sides, 1.3, 10.0)], engine="manifold")
+    mesh, normals, smooth = with_round_normals(whole, 10.0, -1.0)
+    found = find_reach(mesh, BALL, normals=normals)
+    own = (normals != normals[:, :1]).any(axis=(1, 2))[found.touches.triangle]
+    assert own.any()
+    assert not found.reached[own].any()
+    place = found.touches.point[own]
+    assert not ball_fits(mesh, place, smooth(place), R).any()
 
 
 def test_a_half_sphere_smaller_than_the_ball_is_not_touched() -> None:
