@@ -6,10 +6,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.largest_ball import spread_points
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
-from chamberopt.geometry.triangles import areas
+from chamberopt.design.shape_surface import TAG_PART
+from chamberopt.geometry.triangles import area_vectors, interpolate, unit_vectors
 
 if TYPE_CHECKING:
+    from chamberopt.chamber.build import Chamber
     from chamberopt.results.arrays_file import ResultArrays
 
 MOST_PLACES = 3
@@ -17,8 +20,10 @@ MOST_PLACES = 3
 # teeth. Their dents are told as a mean over windows, so many at least: single windows scatter, and
 # the least of many would tell of luck. Places are two cubes apart.
 PATCHES = 8.0
+POINTS = 8.0  # on the side of a cube, of which a patch is made
 LEAST_WINDOWS = 3.0
 SHORT = 0.25  # side of the target over its longest, below which it has no ends along that side
+IN_FRONT = 0.5e-3  # m: what is nearer to a place is its own surface, as pictures are coarse
 ACROSS = 0.7  # share of a normal along an axis from which on the axis is not along the surface
 
 
@@ -26,19 +31,21 @@ class LookedPlace(NamedTuple):
     """A patch of the target to look at.
 
     Attributes:
-        at: its middle on the surface, in the chamber's frame [m], (3,).
+        at: its middle on the surface, off the target's edges, in the chamber's frame [m], (3,).
         normal: out of the part, (3,).
         along: axis of the chamber, 0 to 2, and where the place is along it, from -1 at the target's
             lower end to 1 at its upper end. It is the axis, of those along the surface there, on
             which the place is nearest to an end.
         density: of the dents expected in it after the treatment time, such that its coverage is
             1 - exp(-density).
+        faces_part: whether another face of the part is in front of it, and no wall.
     """
 
     at: np.ndarray
     normal: np.ndarray
     along: tuple[int, float]
     density: float
+    faces_part: bool = False
 
     def coverage(self, times: float) -> float:
         """Return the expected coverage after a multiple of the treatment time."""
@@ -55,18 +62,26 @@ def looked_places(arrays: ResultArrays, gauge: float) -> list[LookedPlace]:
     """
     display, part = arrays.display, arrays.chamber.part
     mesh, fields = display.mesh, display.fields
+    vertices = mesh.vertices.astype(float)
+    known = (fields["reachable"] > 0.5) & (fields["resolved"] > 0.5)
     corners = mesh.triangles[part.target[mesh.part_triangle]]
-    shares = np.repeat(areas(mesh.vertices, corners) / 3.0, 3)
-    weight = np.bincount(corners.ravel(), shares, len(mesh.vertices))
-    known = (weight > 0.0) & (fields["reachable"] > 0.5) & (fields["resolved"] > 0.5)
-    if not known.any():
+    corners = corners[known[corners].all(axis=1)]
+    if not len(corners):
         return []
-    place, weight = mesh.vertices[known].astype(float), weight[known]
-    covered = coverage_from_dent_density(fields["dent_density"][known].astype(float))
-    side = float(np.linalg.norm(np.ptp(place, axis=0))) / PATCHES
-    low, high = place.min(axis=0), place.max(axis=0)
+    low, high = (pick(vertices[corners], axis=(0, 1)) for pick in (np.min, np.max))
+    side = float(np.linalg.norm(high - low)) / PATCHES
+    # Vertices would not do: those of a flat or straight face lie on its edges.
+    spacing = np.full(len(corners), side / POINTS)
+    triangle, place, weight = spread_points(vertices, corners, spacing)
+    own_corners = corners[triangle]
+    coverage = coverage_from_dent_density(fields["dent_density"].astype(float))
+    at_vertices = np.column_stack([coverage, mesh.normal])
+    at_points = interpolate(at_vertices[own_corners], vertices[own_corners], place)
+    covered, normal_at = at_points[:, 0], unit_vectors(at_points[:, 1:])
     is_short = high - low < SHORT * (high - low).max()
-    cell = np.column_stack([np.floor(place / side), mesh.face[known]])
+    cells = np.maximum(np.ceil((high - low) / side), 1.0)  # equal ones, none narrow at an end
+    cell = np.floor((place - low) / np.maximum(high - low, 1e-12) * cells * (1.0 - 1e-9))
+    cell = np.column_stack([cell, mesh.face[own_corners[:, 0]]])
     _, patch = np.unique(cell, axis=0, return_inverse=True)
     patch = patch.reshape(-1)
     area = np.bincount(patch, weight)
@@ -80,11 +95,31 @@ def looked_places(arrays: ResultArrays, gauge: float) -> list[LookedPlace]:
         is_apart = all(np.linalg.norm(at - other.at) > 2.0 * side for other in found)
         if area[one] < LEAST_WINDOWS * gauge or not is_apart:
             continue
-        normal = mesh.normal[known][nearest]
+        normal = normal_at[nearest]
         share = np.where(is_short, 0.0, (2.0 * at - low - high) / np.maximum(high - low, 1e-12))
         axis = int(np.where(np.abs(normal) > ACROSS, 0.0, np.abs(share)).argmax())
         density = -float(np.log1p(-min(mean[one], 1.0 - 1e-9)))
-        found.append(LookedPlace(at, normal, (axis, float(share[axis])), density))
+        faces_part = _faces_part(arrays.chamber, at, normal)
+        found.append(LookedPlace(at, normal, (axis, float(share[axis])), density, faces_part))
         if len(found) == MOST_PLACES:
             break
     return found
+
+
+def _faces_part(chamber: Chamber, at: np.ndarray, normal: np.ndarray) -> bool:
+    """Return whether it is the part that lies straight in front of a place of the part.
+
+    Args:
+        at, normal: those of a LookedPlace.
+    """
+    # Triangles that look back at the place: the surface's normals point out of the cavity.
+    across = area_vectors(chamber.vertices, chamber.triangles)
+    ahead = np.flatnonzero(across @ normal > 0.0)
+    corners, across = chamber.vertices[chamber.triangles[ahead]], across[ahead]
+    away = np.einsum("ij,ij->i", corners[:, 0] - at, across) / (across @ normal)  # [m]
+    point = at + away[:, None] * normal  # on the plane of each
+    sides = np.roll(corners, -1, axis=1) - corners
+    is_left = np.einsum("ijk,ik->ij", np.cross(sides, point[:, None] - corners), across) >= 0.0
+    met = is_left.all(axis=1) & (away > IN_FRONT)
+    first = ahead[np.where(met, away, np.inf).argmin()] if met.any() else None
+    return first is not None and bool(chamber.tags[first] == TAG_PART)
