@@ -6,11 +6,14 @@ import json as json_format
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from chamberopt.cli.console import print_json, print_remarks, show
 from chamberopt.cli.options import Json, Out, Verbose, app
 from chamberopt.cli.prepare import advise_effects
+
+if TYPE_CHECKING:
+    from chamberopt.design.design import Design
 
 
 @app.command
@@ -110,7 +113,7 @@ def _check(
     facts["effects"] = advise_effects(design, chamber) if pilot else groups(design, chamber)
     if not json:
         show(f"effect: {one['said']}" for one in facts["effects"])
-        show([f"{file}: a usable {kind}"])
+        show([f"{file}: {_use_in_words(kind, design)}"])
     if out is not None:
         write_text(out / "check.json", json_format.dumps(facts, indent=2) + "\n")
         write_chamber(out, chamber)
@@ -118,3 +121,19 @@ def _check(
             show([f"results in {out}"])
     if json:
         print_json(facts if out is None else {**facts, "folder": str(out)})
+
+
+def _use_in_words(kind: str, design: Design) -> str:
+    """Return in words what a checked design or study is good for.
+
+    Args:
+        kind: "design" or "study".
+    """
+    from chamberopt.chamber.matters import Urgency, matter_of
+
+    urgencies = [matter_of(one).urgency for one in design.to_settle]
+    count = urgencies.count(Urgency.BEFORE_BUILDING)
+    if not count:
+        return f"a usable {kind}"
+    are = "matters are" if count > 1 else "matter is"
+    return f"a {kind} that can be simulated, but {count} {are} to be settled before it is built"
