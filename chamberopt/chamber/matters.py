@@ -90,6 +90,8 @@ class MatterKind(StrEnum):
     TIME_NOT_RESOLVED = "TIME NOT RESOLVED"
     NOT_MEASURED = "TIME NOT MEASURED"
     FEW_DENTS = "TOO FEW DENTS"
+    # Of all these.
+    WARNED_OF = "THE CHECK WARNS"
 
     @property
     def urgency(self) -> Urgency:

@@ -226,7 +226,9 @@ def first_warnings(
         )
         found.append(DesignWarning(WarningKind.CHARGE, text))
     found += calibration_warnings(design)
-    return found + [DesignWarning(WarningKind.TO_SETTLE, text) for text in matters(design)]
+    # The check itself warns of it, as long as it is so.
+    told = [one for one in matters(design) if MatterKind.WARNED_OF not in one]
+    return found + [DesignWarning(WarningKind.TO_SETTLE, text) for text in told]
 
 
 def matters(design: Design) -> list[str]:

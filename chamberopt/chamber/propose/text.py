@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import tomlkit
 
+from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
 from chamberopt.chamber.layout.balls import MANY, MISSED
 from chamberopt.chamber.layout.target import Surface
 from chamberopt.chamber.matters import Matter, MatterKind, matter_of
@@ -28,6 +29,18 @@ MAX_LISTED = 20  # surfaces in a comment
 EVALUATIONS, SEARCH_HALF_WIDTH = 20, 0.04
 SEARCH_REPLICAS = 4
 TARGET = "part.target"  # its reason begins with its name
+# Warnings that are no matters to be settled: those of which a reason tells, and those of figures.
+OTHERWISE_TOLD = {
+    WarningKind.WIDE_FLOOR,
+    WarningKind.WALL_IN_HOLE,
+    WarningKind.COLLISIONS,
+    WarningKind.PART_TURN,
+    WarningKind.CHARGE,
+    WarningKind.FACETS,
+    WarningKind.CALIBRATION,
+    WarningKind.TO_SETTLE,
+}
+OF_BALLS = {WarningKind.FILLET, WarningKind.SLOT}
 
 
 class Goal(NamedTuple):
@@ -101,6 +114,8 @@ def to_settle(proposal: Proposal, left_out: Sequence[LeftOut]) -> list[Matter]:
 
     said = _clauses_of(proposal)
     found = [one for key in sorted(said, key=place) for one in said[key][1]]
+    warned = [one for one in proposal.warnings if is_to_be_settled(one, proposal)]
+    found += [Matter(MatterKind.WARNED_OF, f": {one_line(one.text)}") for one in warned]
     found += map(matter_of, [*_many_balls(proposal), *_quicker_balls(proposal)])
     for one in left_out:
         keys = " and ".join(f"part.target.{key}" for key in one.keys)
@@ -108,6 +123,14 @@ def to_settle(proposal: Proposal, left_out: Sequence[LeftOut]) -> list[Matter]:
         leave = f": {keys} in the design leave{many} it out" if keys else ""
         found.append(matter_of(f"{one_line(one.text)}{leave}"))
     return sorted(dict.fromkeys(found), key=lambda one: one.urgency)
+
+
+def is_to_be_settled(one: DesignWarning, proposal: Proposal) -> bool:
+    """Return whether a warning of a proposal's check is a matter that no reason of it tells."""
+    if one.kind in OF_BALLS:
+        reason = proposal.reasons["shot.diameter_mm"]
+        return not any(matter.kind is MatterKind.NO_SIZE for matter in clauses(reason)[1])
+    return one.kind not in OTHERWISE_TOLD
 
 
 def _many_balls(proposal: Proposal) -> Iterator[str]:

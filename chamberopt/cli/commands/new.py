@@ -90,6 +90,7 @@ def new(
     from chamberopt.chamber.propose.first_design import propose
     from chamberopt.chamber.propose.proposal import Wanted
     from chamberopt.chamber.propose.proposed_mask import find_left_out
+    from chamberopt.chamber.propose.text import is_to_be_settled
     from chamberopt.chamber.shop import load_shop
     from chamberopt.cli.teller import TerminalTeller
     from chamberopt.common.errors import InputError
@@ -162,7 +163,8 @@ def new(
     if not json:
         show([text(proposal_lines(words, verbose))])
     print_remarks(f"note: {one_line(note)}" for note in done.made.mesh.notes)
-    print_remarks(f"warning: {one.text}" for one in done.made.warnings)
+    untold = (one for one in done.made.warnings if not is_to_be_settled(one, done.made))
+    print_remarks(f"warning: {one.text}" for one in untold)
     if json:
         studies = [str(out / name) for name in done.studies]
         settings = {"settings": [str(out / name) for name in done.settings]}

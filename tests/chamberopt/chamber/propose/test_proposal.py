@@ -11,8 +11,10 @@ from chamberopt.chamber.build import build_chamber
 from chamberopt.chamber.checks.check import warnings
 from chamberopt.chamber.checks.place_names import PART, PART_SIDE
 from chamberopt.chamber.checks.warning import DesignWarning, WarningKind
+from chamberopt.chamber.layout.holder import HolderChoice
 from chamberopt.chamber.layout.sizes import Sizes
 from chamberopt.chamber.layout.target import Surface
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.chamber.propose import held_proposal
 from chamberopt.chamber.propose.held_proposal import _where_left
 from chamberopt.chamber.propose.proposal import (
@@ -24,6 +26,7 @@ from chamberopt.chamber.propose.proposal import (
     propose_tolerances,
     warned_again,
 )
+from chamberopt.chamber.propose.text import to_settle
 from chamberopt.search.study.parameters import Varied
 from tests.helpers.synthetic import plate_design
 
@@ -154,3 +157,61 @@ def test_a_study_lowers_no_part_until_the_face_hits_what_is_outside() -> None:
     sizes = Sizes("box", {}, 17e-3, 55e-3, 10e-3, False, 20e-3)
     low = [propose_ranges(sizes, 5.3, 2.0, 2.5e-5, is_raised=one) for one in (False, True)]
     assert [one["chamber.sonotrode_distance_mm"].low for one in low] == [7, 17]
+
+
+def test_what_the_check_warns_of_is_to_be_settled() -> None:
+    """Balls at rest change the process. That facets are coarse changes figures alone.
+
+    Balls too large for a slot are told of once, also where the reason of their size tells it.
+    """
+    kinds = (WarningKind.REST, WarningKind.SLOT, WarningKind.FACETS)
+    warnings = tuple(DesignWarning(kind, f"the {kind}") for kind in kinds)
+    for reason, expected in (("as asked", ["rest", "slot"]), ("1 mm; NO SIZE SUITS ALL", ["rest"])):
+        made: Any = SimpleNamespace(
+            reasons={"shot.diameter_mm": reason},
+            tables={"shot": {"diameter_mm": 1.0}},
+            warnings=warnings,
+            trials=(),
+            design=plate_design(),
+        )
+        told = [one.text for one in to_settle(made, []) if one.kind is MatterKind.WARNED_OF]
+        assert told == [f": the {kind}" for kind in expected]
+
+
+def test_a_matter_of_which_the_check_warns_is_told_of_once() -> None:
+    design = plate_design(to_settle=("THE CHECK WARNS: balls rest", "NOT MASKED: a face"))
+    chamber = build_chamber(design)
+    told = [one.text for one in warnings(design, chamber) if one.kind is WarningKind.TO_SETTLE]
+    assert told == ["to be settled: NOT MASKED: a face"]
+
+
+@pytest.mark.parametrize(
+    ("shares", "taken"),
+    [((0.98, 0.999), 1), ((0.98, 0.99), 0), ((0.9, 0.98), 1), ((0.9, 0.9), None)],
+)
+def test_a_holder_that_hides_more_is_taken_where_no_other_holds(
+    shares: tuple[float, float], taken: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each is built and checked once, which takes most of the time of a proposal."""
+    choices = [HolderChoice({"kind": "rod", "diameter_mm": k}, "on a face") for k in (0, 1)]
+    tried = []
+
+    def harmless(tables: Any, *others: Any) -> tuple[Any, str]:
+        tried.append(number := tables["holder"]["diameter_mm"])
+        is_hidden = 1.0 - shares[number] > others[-1]
+        made = SimpleNamespace(share=shares[number], number=number)
+        return (None, "the balls do not get there") if is_hidden else (made, "")
+
+    free: Any = SimpleNamespace(
+        design=plate_design(), mesh=None, tables={"sonotrode": {}}, reasons={}, share=1.0
+    )
+    monkeypatch.setattr(held_proposal, "holder_choices", lambda *_: choices)
+    monkeypatch.setattr(held_proposal, "_harmless", harmless)
+    monkeypatch.setattr(held_proposal, "touched_share", lambda one: one.share)
+    monkeypatch.setattr(held_proposal, "_with_balls_on_holder", lambda one: one)
+    monkeypatch.setattr(held_proposal, "replace", lambda one, **_: SimpleNamespace(number=None))
+    unused: Any = None
+    target: Any = SimpleNamespace(triangles=np.zeros(1, dtype=bool))
+    found: Any = held_proposal.held(free, unused, target, None, [], None, lambda *_: None)
+    assert found.number == taken
+    assert tried == [0, 1]

@@ -246,6 +246,7 @@ def test_what_faces_away_is_offered_for_leaving_out(
         tables={"part": {"mesh": str(tmp_path / "gear.obj")}, "part.target": target.keys},
         reasons={},
         trials=(),
+        warnings=(),
         poses=(),
         strips=None,
     )
