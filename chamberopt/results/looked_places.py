@@ -8,11 +8,9 @@ import numpy as np
 
 from chamberopt.chamber.largest_ball import spread_points
 from chamberopt.coverage.coverage_from_impacts import coverage_from_dent_density
-from chamberopt.design.shape_surface import TAG_PART
-from chamberopt.geometry.triangles import area_vectors, interpolate, unit_vectors
+from chamberopt.geometry.triangles import interpolate, unit_vectors
 
 if TYPE_CHECKING:
-    from chamberopt.chamber.build import Chamber
     from chamberopt.results.arrays_file import ResultArrays
 
 MOST_PLACES = 3
@@ -23,7 +21,6 @@ PATCHES = 8.0
 POINTS = 8.0  # on the side of a cube, of which a patch is made
 LEAST_WINDOWS = 3.0
 SHORT = 0.25  # side of the target over its longest, below which it has no ends along that side
-IN_FRONT = 0.5e-3  # m: what is nearer to a place is its own surface, as pictures are coarse
 ACROSS = 0.7  # share of a normal along an axis from which on the axis is not along the surface
 
 
@@ -38,14 +35,12 @@ class LookedPlace(NamedTuple):
             which the place is nearest to an end.
         density: of the dents expected in it after the treatment time, such that its coverage is
             1 - exp(-density).
-        faces_part: whether another face of the part is in front of it, and no wall.
     """
 
     at: np.ndarray
     normal: np.ndarray
     along: tuple[int, float]
     density: float
-    faces_part: bool = False
 
     def coverage(self, times: float) -> float:
         """Return the expected coverage after a multiple of the treatment time."""
@@ -99,27 +94,7 @@ def looked_places(arrays: ResultArrays, gauge: float) -> list[LookedPlace]:
         share = np.where(is_short, 0.0, (2.0 * at - low - high) / np.maximum(high - low, 1e-12))
         axis = int(np.where(np.abs(normal) > ACROSS, 0.0, np.abs(share)).argmax())
         density = -float(np.log1p(-min(mean[one], 1.0 - 1e-9)))
-        faces_part = _faces_part(arrays.chamber, at, normal)
-        found.append(LookedPlace(at, normal, (axis, float(share[axis])), density, faces_part))
+        found.append(LookedPlace(at, normal, (axis, float(share[axis])), density))
         if len(found) == MOST_PLACES:
             break
     return found
-
-
-def _faces_part(chamber: Chamber, at: np.ndarray, normal: np.ndarray) -> bool:
-    """Return whether it is the part that lies straight in front of a place of the part.
-
-    Args:
-        at, normal: those of a LookedPlace.
-    """
-    # Triangles that look back at the place: the surface's normals point out of the cavity.
-    across = area_vectors(chamber.vertices, chamber.triangles)
-    ahead = np.flatnonzero(across @ normal > 0.0)
-    corners, across = chamber.vertices[chamber.triangles[ahead]], across[ahead]
-    away = np.einsum("ij,ij->i", corners[:, 0] - at, across) / (across @ normal)  # [m]
-    point = at + away[:, None] * normal  # on the plane of each
-    sides = np.roll(corners, -1, axis=1) - corners
-    is_left = np.einsum("ijk,ik->ij", np.cross(sides, point[:, None] - corners), across) >= 0.0
-    met = is_left.all(axis=1) & (away > IN_FRONT)
-    first = ahead[np.where(met, away, np.inf).argmin()] if met.any() else None
-    return first is not None and bool(chamber.tags[first] == TAG_PART)

@@ -125,12 +125,6 @@ def _slowest(result: Result, built: AsBuilt) -> str:
             f"{plain(1e3 * ball)} mm: simulate balls of at most "
             f"{plain(1e3 * OF_FILLET * min(narrow), 2)} mm"
         )
-    elif place.faces_part:
-        what = (
-            "it looks at another face of the part, so that more room beside the part does not "
-            "help: simulate smaller balls, or a pose in which the gap between the two faces is "
-            "open to the sonotrode"
-        )
     elif place.normal[2] > ASIDE and not turns:
         what = "it looks up: simulate the part turned over after half of the time ([[steps]])"
     elif abs(place.normal[2]) <= ASIDE and not turns:
