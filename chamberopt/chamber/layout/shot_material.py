@@ -1,4 +1,4 @@
-"""Choose of what material the balls are, by the metal of the part and its hardness."""
+"""Choose of what balls and walls are, by the metal of the part and its hardness."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from chamberopt.common.errors import InputError
 from chamberopt.design.materials import alloy, alloys, ball, balls, find
 
 CERAMIC = "zirconia"  # for metals on which steel leaves iron
+# Walls: hardened steel, as soft ones slow the balls. Where they must leave no iron they are of the
+# sonotrode's metal, and for stainless parts of a stainless steel that is as hard.
+HARD_WALL, CLEAN_WALL, STAINLESS_WALL = "100Cr6", "Ti-6Al-4V", "17-4PH"
 # Least hardness of steel balls over the part's. A part as hard as they are is dented less: in
 # pilots of a gear of 650 HB tungsten carbide left 9 times the dents.
 HARDER = 1.25
@@ -54,6 +57,25 @@ def choose_shot(name: str, part: str, shop: Shop) -> tuple[str, str]:
     return HARD, f"harder than the part, of {hardness:g} HB: balls of steel dent it less"
 
 
+def choose_walls(part: str, shot: str) -> tuple[str, str]:
+    """Return the metal of the walls, and the reason for it.
+
+    Args:
+        part: the part's alloy.
+        shot: material of the balls. Those of steel leave iron whatever the walls are of.
+    """
+    if shot == STEEL or not iron_of_walls(part, HARD_WALL):
+        return HARD_WALL, "hardened, as soft walls slow the balls; give yours"
+    own = alloy(part)
+    walls = STAINLESS_WALL if own.stainless else CLEAN_WALL
+    metal = "stainless steel" if own.stainless else own.metal
+    return walls, (
+        f"leaves no iron on {metal}, as {HARD_WALL} would; at {alloy(walls).hardness_HB:g} HB it "
+        f"slows the balls more than {HARD_WALL} of {alloy(HARD_WALL).hardness_HB:g} HB, which is "
+        "simulated; give yours"
+    )
+
+
 def iron_of_walls(part: str, walls: str) -> str:
     """Return what walls that may leave iron on a part's metal need; "" where they leave none.
 
@@ -72,9 +94,9 @@ def iron_of_walls(part: str, walls: str) -> str:
     hard = "stainless steel" if own.stainless else "titanium or aluminium"
     return (
         f"{MatterKind.IRON_FROM_WALLS}: balls carry what they wear from {of_walls.name} onto "
-        f"{name}, whatever they are made of: walls of {hard}, or lined with it, which slow the "
-        "balls more where they are softer (simulate again), or decontaminate the part after "
-        "peening (no source read)"
+        f"{name}, whatever they are made of: walls of {hard} (materials.wall), or lined with it, "
+        "which slow the balls more where they are softer (simulate again), or decontaminate the "
+        "part after peening (no source read)"
     )
 
 

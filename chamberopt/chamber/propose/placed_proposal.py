@@ -20,7 +20,12 @@ from chamberopt.chamber.layout.balls import fit_sizes, propose_ball, sizes_to_tr
 from chamberopt.chamber.layout.end import Shape, cut_shape, root_out, strip
 from chamberopt.chamber.layout.floor import SEVERAL, Floor
 from chamberopt.chamber.layout.pose import AT_SIDE, Turns, pose_by_size, pose_in_words
-from chamberopt.chamber.layout.shot_material import choose_shot, hardness_in_words, iron_of_walls
+from chamberopt.chamber.layout.shot_material import (
+    choose_shot,
+    choose_walls,
+    hardness_in_words,
+    iron_of_walls,
+)
 from chamberopt.chamber.layout.target import Surface, Target
 from chamberopt.chamber.layout.turning import RPM, Spindle, turning_bore, turning_pose
 from chamberopt.chamber.matters import MatterKind
@@ -75,7 +80,7 @@ FEW = 2  # sonotrodes side by side that are better than a room of which the part
 # that is longer is peened a strip at a time instead of on end, where it can be.
 TALLEST = 0.3
 WIDER = (1.0, 1.4, 2.0)  # factors on the room round the part that are tried
-USUAL_PART, WALL, SONOTRODE = "42CrMo4", "100Cr6", "Ti-6Al-4V"  # of the catalogue
+USUAL_PART, SONOTRODE = "42CrMo4", "Ti-6Al-4V"  # of the catalogue
 TREATMENT_S, HALF_WIDTH = 300.0, 0.03
 FEWER = "so that a strip of it takes few sonotrodes"
 TURNED = "its axis level: about it the part turns, so that all of it passes the shot"
@@ -247,6 +252,7 @@ def _set_up(given: Given, stance: Stance) -> _Setup:
     (path, wanted, mesh, _), end, spindle = given, stance.end, stance.spindle
     target, turns, why = stance.target, stance.turns, stance.why
     shot, shot_reason = choose_shot(wanted.shot, given.alloy, given.shop)
+    walls, wall_reason = choose_walls(given.alloy, shot)
     if end is not None:
         target, turns = end.target, end.turns
     tables: Tables = {
@@ -256,7 +262,7 @@ def _set_up(given: Given, stance: Stance) -> _Setup:
         "chamber": {},
         "sonotrode": {},
         "shot": {"mass_g": 1.0, "diameter_mm": 1.0, "material": shot},
-        "materials": {"part": given.alloy, "wall": WALL, "sonotrode": SONOTRODE},
+        "materials": {"part": given.alloy, "wall": walls, "sonotrode": SONOTRODE},
         "effects": {"gravity": True, "friction": CATALOGUE, "roughness": USUAL},
         "process": {
             "treatment_time_s": TREATMENT_S,
@@ -299,8 +305,8 @@ def _set_up(given: Given, stance: Stance) -> _Setup:
         + hardness_in_words(given.alloy, shot)
         if wanted.alloy
         else f"{MatterKind.ALLOY}, a guess: chamberopt materials lists alloys",
-        "materials.wall": "hardened, as soft walls slow the balls; give yours"
-        + (f"; {iron}" if (iron := iron_of_walls(given.alloy, WALL)) else ""),
+        "materials.wall": wall_reason
+        + (f"; {iron}" if (iron := iron_of_walls(given.alloy, walls)) else ""),
         "effects.friction": "mu of these balls on these metals, dry: chamberopt materials",
         "effects.roughness": "rms slope of faces that shot has dented",
         "process.treatment_time_s": f"{MatterKind.NOT_MEASURED} by a pilot, a start: the "

@@ -13,7 +13,7 @@ from shapely import Polygon
 
 from chamberopt.chamber.checks.warning import WarningKind
 from chamberopt.chamber.layout.pose import pose_in_words
-from chamberopt.chamber.layout.shot_material import choose_shot, iron_of_walls
+from chamberopt.chamber.layout.shot_material import choose_shot, choose_walls, iron_of_walls
 from chamberopt.chamber.layout.target import Surface, propose_target, surfaces
 from chamberopt.chamber.propose import proposed_room
 from chamberopt.chamber.propose.first_design import propose
@@ -198,6 +198,22 @@ def test_walls_of_steel_beside_a_metal_that_iron_spoils_are_told(
     part: str, walls: str, is_told: bool
 ) -> None:
     assert iron_of_walls(part, walls).startswith("IRON FROM THE WALLS") is is_told
+
+
+@pytest.mark.parametrize(
+    ("part", "shot", "walls"),
+    [
+        ("Ti-6Al-4V", "zirconia", "Ti-6Al-4V"), ("7075-T6", "zirconia", "Ti-6Al-4V"),
+        ("316L", "zirconia", "17-4PH"), ("CoCrMo", "zirconia", "Ti-6Al-4V"),
+        ("Ti-6Al-4V", "steel", "100Cr6"), ("42CrMo4", "steel", "100Cr6"),
+        ("IN718", "tungsten_carbide", "100Cr6"),
+    ],
+)  # fmt: skip
+def test_walls_leave_no_iron_where_the_balls_leave_none(part: str, shot: str, walls: str) -> None:
+    found, reason = choose_walls(part, shot)
+    assert found == walls
+    assert reason.startswith("hardened" if walls == "100Cr6" else "leaves no iron on ")
+    assert not iron_of_walls(part, found) or shot == "steel"
 
 
 def _lowest(known: Sequence[Surface]) -> list[str]:
