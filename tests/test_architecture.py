@@ -39,7 +39,7 @@ ORDER = {
     "chamberopt/simulation": "resting_balls trapped_balls settling effort replicas evaluation "
     "estimates evaluate time_curve field_values variations advice effect_pilot+budget_pilot "
     "error_law numerical_parameters+timed_replicas convergence recommendation",
-    "chamberopt/peening": "strip+calibration_errors kirk_fit+strip_holder responses "
+    "chamberopt/peening": "strip+calibration_errors kirk_fit+strip_holder held_strip+responses "
     "tolerance_result range_result tolerances+ranges+intensity_pilot measured probes virtual_strip "
     "posterior setups profile_fit calibrate next_measurement",
     "chamberopt/search": "study+optimiser trial_log study_folder "

@@ -195,7 +195,12 @@ class PredictedIntensity:
     @property
     def on_n_strips(self) -> str:
         """The arc height of an N strip in words."""
-        return f"{plain(OVER_A['N'] * self.value, 2)} mm on N strips"
+        return self.on_strips("N")
+
+    def on_strips(self, strip: StripType) -> str:
+        """Return the arc height of a strip of a type in words."""
+        value = plain(OVER_A[strip] * self.value, 2)
+        return f"{value} mmA" if strip == "A" else f"{value} mm on {strip} strips"
 
     def standing(self, wanted: tuple[float, float]) -> str:
         """Return where the whole 95 % interval lies: INSIDE a range, OUTSIDE it, or NOT_DECIDED.
@@ -220,6 +225,23 @@ class PredictedIntensity:
             f"{value} mmA, within a factor of {factor} (one standard deviation, at 95 % {low} to "
             f"{high} mmA): {UNTIL}"
         )
+
+
+def strip_type(intensity: float) -> StripType:
+    """Return the type of the strips that measure an intensity [mmA]."""
+    return next(one for one, (_, high) in USED_FOR.items() if intensity < high)
+
+
+def range_on_strips(low: float, high: float) -> str:
+    """Return a range [mmA] in words, in mm of the strips that measure it.
+
+    An order in mmN or mmC is so told as it was given, and beside it what it is in mmA, roughly.
+    """
+    strip, ends = strip_type(high), f"{plain(low, 2)} to {plain(high, 2)} mmA"
+    if strip == "A":
+        return f"{plain(low)} to {plain(high)} mmA"
+    own = " to ".join(plain(OVER_A[strip] * one, 2) for one in (low, high))
+    return f"{own} mm{strip} (roughly {ends})"
 
 
 @dataclass(frozen=True)

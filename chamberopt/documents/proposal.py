@@ -23,17 +23,15 @@ from chamberopt.chamber.propose.text import clauses, to_settle
 from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import in_words
 from chamberopt.common.number_text import NO_BREAK, held_together, plain, rounded
-from chamberopt.design.intensity import NOT_DECIDED
+from chamberopt.design.intensity import NOT_DECIDED, strip_type
 from chamberopt.documents.document import Table
 from chamberopt.geometry.triangles import areas
-from chamberopt.peening.strip import StripSize
-from chamberopt.peening.strip_holder import strip_room, target_level_mm, why_no_strip
+from chamberopt.peening.held_strip import held_strip
 
 if TYPE_CHECKING:
     from chamberopt.chamber.layout.target import Surface
     from chamberopt.chamber.propose.proposal import BallTrial, PoseTrial, Proposal
     from chamberopt.chamber.propose.proposed_mask import LeftOut
-    from chamberopt.design.design import Design
 
 WIDTH, INDENT = 79, 13  # columns
 MOST_LISTED = 6  # surfaces, without --verbose
@@ -310,35 +308,32 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     if INTENSITY in made.reasons:
         value = clauses(made.reasons[INTENSITY])[0][0].partition(": ")[0]
         yield "intensity", value, (INTENSITY,)
-        yield "strips", _strips(design, target_level_mm(made.chamber)), ()
+        yield "strips", _strips(made), ()
     accuracy = design.process.accuracy
     simulated = f"{accuracy.replicas} replicas of {plain(accuracy.simulated_time, 3)} s"
     keys = tuple(f"process.accuracy.{key}" for key in tables["process.accuracy"])
     yield SIMULATED, simulated, keys
 
 
-def _strips(design: Design, level: int) -> str:
-    """Return in words which strips or what else tells the intensity of a proposal.
-
-    Args:
-        level: of the target's middle above the sonotrode [mm].
-    """
+def _strips(made: Proposal) -> str:
+    """Return in words which strips or what else tells the intensity of a proposal."""
+    wanted, expected = made.design.process.intensity_mmA, made.expected
+    kind = "A" if expected is None else strip_type(expected.value)
+    kind = kind if wanted is None else strip_type(wanted[1])
+    held = held_strip(made.design, made.chamber, kind)
+    by_dents = "accept a part by its coverage, for which the process sheet names places and shares"
+    if held is None or held.size is None:
+        why = "no lid of this chamber takes one" if held is None else held.why_no_whole
+        return f"{why}: {by_dents}, and the intensity by a coupon of its metal"
     place = (
-        f"in the lid in place of the part, {level} mm from the sonotrode as the middle of the "
-        "target is"
+        f"in the lid in place of the part, {plain(held.level_mm)} mm from the sonotrode as the "
+        f"middle of the target is: chamberopt strip {held.options}"
     )
-    if not why_no_strip(design, StripSize()):
-        return f"{place}: chamberopt strip --distance-mm {level}"
-    room = strip_room(design)
-    if room is None:
-        return (
-            "no lid of this chamber takes one: accept a part by its coverage, for which the "
-            "process sheet names places and shares, and the intensity by a coupon of its metal"
-        )
+    if held.is_whole:
+        return f"{kind} strips {place}"
     return (
-        f"no whole one fits; the largest {place}: {room.in_words} (chamberopt strip --disc-mm "
-        f"{room.disc:g} --distance-mm {level}); its arc heights are no mmA: accept a part by its "
-        "coverage, for which the process sheet names places and shares"
+        f"{held.why_no_whole}: pieces of {held.size_in_words} cut from {kind} strips, {place}; "
+        f"their arc heights are no mm{kind} until they are correlated with whole strips: {by_dents}"
     )
 
 

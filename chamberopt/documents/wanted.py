@@ -8,12 +8,20 @@ from typing import TYPE_CHECKING
 
 from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.number_text import estimate_text
-from chamberopt.design.intensity import OUTSIDE, TOO_FEW, Comparison, PredictedIntensity
+from chamberopt.design.intensity import (
+    OUTSIDE,
+    TOO_FEW,
+    Comparison,
+    PredictedIntensity,
+    range_on_strips,
+    strip_type,
+)
 from chamberopt.documents.document import AnswerLine
 from chamberopt.documents.ranges import groups_text, slow_end_is_late, time_at_slow_end
 from chamberopt.documents.wording import metric_label, plain
 
 if TYPE_CHECKING:
+    from chamberopt.design.almen_strip import StripType
     from chamberopt.design.load import Design
     from chamberopt.results.load import Result
 
@@ -28,7 +36,21 @@ UNKNOWN = "when it is covered is not resolved"
 def intensity_text(design: Design) -> str:
     """Return the range of the wanted intensity, such as "0.15 to 0.2 mmA", or ""."""
     wanted = design.process.intensity_mmA
-    return "" if wanted is None else f"{plain(wanted[0])} to {plain(wanted[1])} mmA"
+    return "" if wanted is None else range_on_strips(*wanted)
+
+
+def strip_for(design: Design, metrics: Mapping[str, Estimate]) -> StripType:
+    """Return the type of the strips that measure the wanted intensity, or else the expected one.
+
+    Machines are calibrated by A strips, which are taken too where nothing is known.
+    """
+    wanted, calibration = design.process.intensity_mmA, design.calibration
+    if wanted is not None:
+        return strip_type(wanted[1])
+    found = None
+    if calibration is None or not calibration.has_strips:
+        found = PredictedIntensity.of(metrics, calibration)
+    return "A" if found is None else strip_type(found.value)
 
 
 def coverage_text(design: Design) -> str:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,9 +29,6 @@ from chamberopt.design.shapes.base import ParametricChamber, PolygonChamber
 from chamberopt.design.shapes.straight import Cylinder
 from chamberopt.geometry.triangles import area_vectors
 from chamberopt.peening.strip import StripSize
-
-if TYPE_CHECKING:
-    from chamberopt.chamber.build import Chamber
 
 HOLDER_FILE = "strip_holder.obj"
 STRIP_GROUP = "strip"
@@ -71,26 +68,6 @@ def strip_design(
     return validate(Design, data)
 
 
-def target_level_mm(chamber: Chamber) -> int:
-    """Return how far from the sonotrode a chamber's target lies on the average [mm].
-
-    A strip is set there: farther away it saturates later.
-    """
-    part = chamber.part
-    height = part.vertices[part.triangles].mean(axis=1)[:, 2]
-    area = np.where(part.target, chamber.exposed_area, 0.0)
-    return round(1e3 * float(np.average(height, weights=area + 1e-30)))
-
-
-def why_no_strip(design: Design, size: StripSize) -> str:
-    """Return in words why no strip is flush in the lid in the place of the part; "" if it fits."""
-    try:
-        _edge_that_fits(size, _lid_of(design, None)[2])
-    except InputError as error:
-        return str(error)
-    return ""
-
-
 def lies_along_y(design: Design, size: StripSize, distance_mm: float | None = None) -> bool:
     """Return whether a strip that fits into a lid lies along y in it, as it does not fit along x.
 
@@ -98,14 +75,18 @@ def lies_along_y(design: Design, size: StripSize, distance_mm: float | None = No
         distance_mm: distance from the sonotrode to the strip; None: as far as the part.
     """
     outline = _lid_of(design, distance_mm)[2]
-    return _growth(_edge_mm(size), outline) < 1.0 - FIT_MM
+    return growth(_edge_mm(size), outline) < 1.0 - FIT_MM
 
 
-def strip_along(design: Design) -> str:
-    """Return the axis along which a whole strip lies in a lid, "" where none fits into it."""
-    if why_no_strip(design, StripSize()):
-        return ""
-    return "y" if lies_along_y(design, StripSize()) else "x"
+def lid_outline_mm(design: Design, distance_mm: float) -> np.ndarray | None:
+    """Return the outline (n, 2) [mm] of the room at a distance from the sonotrode [mm].
+
+    It is None for a chamber that takes no lid.
+    """
+    try:
+        return _lid_of(design, distance_mm)[2]
+    except InputError:
+        return None
 
 
 def _lid_of(
@@ -149,26 +130,12 @@ class StripRoom(NamedTuple):
     width: float
     disc: float
 
-    @property
-    def in_words(self) -> str:
-        """Both sizes, such as "a strip of 38 x 9.4 mm or a disc of 40 mm"."""
-        return f"a strip of {self.length:g} x {self.width:g} mm or a disc of {self.disc:g} mm"
-
-
-def strip_room(design: Design) -> StripRoom | None:
-    """Return what fits into a lid in the place of the part; None if the chamber takes no lid."""
-    try:
-        outline = _lid_of(design, None)[2]
-    except InputError:
-        return None
-    return _largest(StripSize(), outline)
-
 
 def _largest(size: StripSize, outline: np.ndarray) -> StripRoom:
     """Return the largest strip of a size's proportions, and disc, inside an outline (n, 2) [mm]."""
     rectangle = _edge_mm(replace(size, is_disc=False))
-    growth = max(_growth(edge, outline) for edge in (rectangle, _turned(rectangle)))
-    length = 0.1 * math.floor(10.0 * growth * 1e3 * size.length)
+    most = max(growth(edge, outline) for edge in (rectangle, _turned(rectangle)))
+    length = 0.1 * math.floor(10.0 * most * 1e3 * size.length)
     width = math.floor(10.0 * length * size.width / size.length) / 10
     disc = 0.1 * math.floor(10.0 * 2.0 * float(_sides(outline)[1].min()))
     return StripRoom(length, width, disc)
@@ -181,7 +148,7 @@ def _sides(outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return normal, (normal * outline).sum(axis=1)
 
 
-def _growth(edge: np.ndarray, outline: np.ndarray) -> float:
+def growth(edge: np.ndarray, outline: np.ndarray) -> float:
     """Return the factor by which an edge, corners (n, 2), could grow and still fit an outline."""
     normal, reach = _sides(outline)
     return float((reach / (edge @ normal.T).max(axis=0)).min())
@@ -194,7 +161,7 @@ def _edge_that_fits(size: StripSize, outline: np.ndarray) -> np.ndarray:
     """
     edge = _edge_mm(size)
     for one in (edge, _turned(edge)):
-        if _growth(one, outline) >= 1.0 - FIT_MM:
+        if growth(one, outline) >= 1.0 - FIT_MM:
             return one
     room = _largest(size, outline)
     given = f"a {size}" if size.is_disc else f"a strip of {size}"

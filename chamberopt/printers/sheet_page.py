@@ -35,8 +35,9 @@ from chamberopt.documents.sheet import (
     reference_limits,
     slit_limits,
 )
+from chamberopt.documents.wanted import strip_for
 from chamberopt.geometry.triangles import tetrahedron_volumes
-from chamberopt.peening.strip_holder import strip_along, target_level_mm
+from chamberopt.peening.held_strip import held_strip
 from chamberopt.pictures.charts.colours import BLACK, DARK_GREY, GREY
 from chamberopt.pictures.charts.figure_style import ignore_settings_here
 from chamberopt.pictures.coverage import draw_coverage
@@ -301,6 +302,7 @@ def write_sheet(
         push = push_of_shot(loaded, arrays)
         design, part, openings = loaded.design, chamber.part, find_openings(chamber)
         clear = clearance_of(loaded)
+        held = held_strip(design, chamber, strip_for(design, loaded.metrics))
         built = AsBuilt(
             face_size_mm(chamber),
             openings,
@@ -309,7 +311,7 @@ def write_sheet(
             plugs_of(design, part),
             usual_for_target(design, part),
             [find_openings(step) for step in chamber.steps[1:]],
-            target_level_mm(chamber),
+            held,
             radii_of_target(design, part),
             largest_flat_face(part),
             part_is_ceiling(chamber),
@@ -325,7 +327,7 @@ def write_sheet(
         pages = draw_sheet(
             sheet,
             chamber,
-            Shown(limits, design.sonotrode.face, 1e3 * clear, strip_along(design)),
+            Shown(limits, design.sonotrode.face, 1e3 * clear, held),
             outlines,
             coverage_map(loaded.folder, 3 if outlines else VIEWS_A_ROW, places),
         )

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chamberopt.chamber.checks.fillets import OF_FILLET
+from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.propose.proposed_budget import UNEVEN
 from chamberopt.common.number_text import rounded
 from chamberopt.coverage.metrics import FULL_COVERAGE
 from chamberopt.design.almen_strip import STRIPS
 from chamberopt.documents.sheet.rows import AsBuilt, Row
-from chamberopt.documents.wanted import intensity_text, multiple_in_words
+from chamberopt.documents.wanted import intensity_text, multiple_in_words, strip_for
 from chamberopt.documents.wording import per_cent, plain
-from chamberopt.peening.strip_holder import strip_along, strip_room
+from chamberopt.peening.held_strip import SCREW_MM
 
 if TYPE_CHECKING:
     from chamberopt.results.load import Result
@@ -26,8 +27,8 @@ TIME = "time_to_98_s"
 STRIP_WIDTHS_MM = "18.8 to 19.05"  # mm, of Almen strips (SAE J442, as shops quote it)
 # By heart, as no text of the standard was read.
 BLOCK = (
-    "Usual block, by heart, to be compared with SAE J442: hardened, ground flat, at least 10 mm "
-    "thick under the strip; screws M5"
+    "Usual, by heart, to be compared with SAE J442: hardened, ground flat, at least 10 mm thick "
+    "under the strip"
 )
 LENS = "a magnifier of 10 to 30 times (SAE J2277)"
 ASIDE = 0.35  # least share of a normal along an axis for a surface to be told to look that way
@@ -75,8 +76,6 @@ def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         "for the same time once more and look again; REJECT it if it is still less.",
     )
     yield "intensity", _intensity(result, built)
-    if along := strip_along(result.design):
-        yield "strip holder", _strip_holder(along, built)
 
 
 def _kind(result: Result, built: AsBuilt) -> str:
@@ -180,32 +179,52 @@ def _why_longer(result: Result) -> str:
     return f", for the {plain(percent)} % that are wanted"
 
 
-def _strip_holder(along: str, built: AsBuilt) -> str:
-    """Return in words how an Almen strip is held in the place of the part, with its sizes.
-
-    Args:
-        along: the axis along which it lies.
-    """
-    strip = STRIPS["A"]
-    level = "" if built.level_mm is None else f", {built.level_mm} mm from the sonotrode's face"
+def strip_rows(built: AsBuilt) -> Iterator[Row]:
+    """Yield rows on how an Almen strip is held in the place of the part, with its sizes."""
+    held = built.held
+    if held is None or held.size is None:
+        return
+    strip = STRIPS[held.type]
     sizes = f"{plain(1e3 * strip.length)} × {STRIP_WIDTHS_MM} × {plain(1e3 * strip.thickness)} mm"
-    return (
-        f"an A strip, {sizes} (SAE J442), lies flat on a steel block in a lid in the place of the "
-        f"part: its middle on the room's axis, its length along {along}, its peened face down and "
-        f"flush with the lid{level}. Four screws whose heads reach over its long edges hold it. "
-        f"{BLOCK}"
+    article = "a" if held.type == "C" else "an"
+    cut = "" if held.is_whole else f"a piece of {held.size_in_words}, cut from "
+    yield (
+        "strip",
+        f"{cut}{article} {held.type} strip, {sizes} (SAE J442): its middle on the room's axis, its "
+        f"length along {held.along}, its peened face down, {plain(held.level_mm)} mm from the "
+        "sonotrode's face",
+    )
+    is_aside = bool({one.wall for one in built.openings} - {CEILING})
+    walls = "; those that the part leaves in the walls are closed flush" if is_aside else ""
+    into = "flush with the ceiling"
+    if held.block_mm:
+        into = (
+            f"{plain(held.block_mm)} mm below the ceiling, as the target is: there the block fills "
+            "the room but for the gap of a joint"
+        )
+    yield (
+        "block",
+        f"of steel, in the place of the part: it closes the room and has no opening{walls}. Its "
+        f"lower face, on which the strip lies, is {into}. {BLOCK}",
+    )
+    along, across = map(plain, held.screws_mm)
+    yield (
+        "screws",
+        f"four, M{plain(SCREW_MM)}, at {along} mm along and {across} mm across from the strip's "
+        "middle: their heads reach over its long edges",
     )
 
 
 def _intensity(result: Result, built: AsBuilt) -> str:
     """Return in words what accepts the intensity, or that nothing does yet."""
-    design = result.design
+    design, held = result.design, built.held
     wanted = intensity_text(design)
     is_told = "almen_intensity" in result.metrics
     not_by_dents = "not accepted by coverage"
     own = design.calibration.own_strips if is_told and design.calibration else ""
-    if own or strip_along(design):
-        strips = f"a {own}, with which the machine was calibrated," if own else "strips"
+    kind = strip_for(design, result.metrics)
+    if own or (held is not None and held.is_whole):
+        strips = f"a {own}, with which the machine was calibrated," if own else f"{kind} strips"
         by = f"{strips} in the lid, {'after the times of' if is_told else 'as under'} Measure first"
         if is_told:
             aim = f"ACCEPT {wanted}" if wanted else "no range is asked for: record it"
@@ -213,16 +232,17 @@ def _intensity(result: Result, built: AsBuilt) -> str:
         aim = f"ACCEPT {wanted}" if wanted else "agree on a range in mmA"
         return f"{not_by_dents}: {aim} by {by}"
     accept = f"ACCEPT {wanted}" if wanted else "ACCEPT the first part"
-    room = strip_room(design)
-    if room is None:
+    if held is None or held.size is None:
+        why = "no lid takes a strip here" if held is None else held.why_no_whole
         return (
-            f"{not_by_dents}: no lid takes a strip here. {accept} by {COUPON}; held where the "
-            "target is, facing as it does"
+            f"{not_by_dents}: {why}. {accept} by {COUPON}; held where the target is, facing as it "
+            "does"
         )
-    level = "" if built.level_mm is None else f" {built.level_mm} mm from the sonotrode"
+    gauge = "; they are wide enough for the usual gauge" if held.is_on_gauge else ""
+    walls = f"; or whole strips on the room's wall {held.walls}" if held.walls else ""
     return (
-        f"{not_by_dents}, and no whole strip fits. {accept} by what is held flush in a steel lid"
-        f"{level} in the place of the part, facing the sonotrode: {room.in_words}, cut from an A "
-        "strip, once its arc heights are correlated with mmA (peen some beside whole strips where "
-        f"both fit, at three intensities or more); or {COUPON}"
+        f"{not_by_dents}, and no whole strip is held in the lid: {held.why_no_whole}. {accept} by "
+        f"pieces of {held.size_in_words} cut from {kind} strips, held as under Strip holder, "
+        f"once their arc heights are correlated with mm{kind} (peen some beside whole strips where "
+        f"both fit, at three intensities or more{gauge}){walls}; or by {COUPON}"
     )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.documents.answer import answer
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
-from chamberopt.documents.sheet.acceptance import acceptance_rows
+from chamberopt.documents.sheet.acceptance import acceptance_rows, strip_rows
 from chamberopt.documents.sheet.expected import calibrated_to, expected_rows, first_checks
 from chamberopt.documents.sheet.rows import AsBuilt, Row
 from chamberopt.documents.sheet.settings import (
@@ -31,7 +31,6 @@ from chamberopt.documents.sheet.warned import (
 from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
-    from chamberopt.chamber.checks.openings import Opening
     from chamberopt.results.load import Result
 
 DIGEST = 12  # characters of a digest in the title block
@@ -62,7 +61,7 @@ def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Documen
     """
     record = result.record
     start = load_start(result)
-    checks, calibrated = first_checks(result, built.level_mm), calibrated_to(result)
+    checks, calibrated = first_checks(result, built.held), calibrated_to(result)
     reasons = (
         *alarms(result),
         *unusual_intensity(result, built.usual),
@@ -81,7 +80,7 @@ def process_sheet(result: Result, built: AsBuilt, revision: str = "") -> Documen
         (),
         [
             Section("Process sheet", content),
-            Section("Measurements, limits and warnings", limit_tables(result, built.openings)),
+            Section("Measurements, limits and warnings", limit_tables(result, built)),
             Section("Title block", [block]),
         ],
     )
@@ -123,16 +122,13 @@ def setting_tables(result: Result, built: AsBuilt) -> list[Table]:
     ])  # fmt: skip
 
 
-def limit_tables(result: Result, openings: Sequence[Opening] = ()) -> list[Table]:
-    """Return tables on limits, tolerances, and everything that the process is warned of.
-
-    Args:
-        openings: through which the part goes out.
-    """
+def limit_tables(result: Result, built: AsBuilt) -> list[Table]:
+    """Return tables on how strips are held, limits, tolerances, and all that is warned of."""
     return _tables([
+        ("Strip holder", strip_rows(built)),
         *matter_tables(result),
         ("Zones and limits", zone_rows(result)),
-        ("Tolerances", tolerance_rows(result, openings)),
+        ("Tolerances", tolerance_rows(result, built.openings)),
         ("Not in these figures", (("", text) for text in cautions(result))),
         ("Warnings", warning_rows(result)),
     ])  # fmt: skip

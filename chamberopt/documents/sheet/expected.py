@@ -26,15 +26,14 @@ from chamberopt.documents.sheet.rows import (
     weighed_g,
     with_limits,
 )
-from chamberopt.documents.wanted import may_be_too_short, wanted_rows
+from chamberopt.documents.wanted import may_be_too_short, strip_for, wanted_rows
 from chamberopt.documents.wording import metric_label, plain
-from chamberopt.peening.strip import StripSize
-from chamberopt.peening.strip_holder import strip_along
 from chamberopt.results.load import load_start
 
 if TYPE_CHECKING:
-    from chamberopt.design.design import Design
+    from chamberopt.design.almen_strip import StripType
     from chamberopt.documents.coverage import Figure
+    from chamberopt.peening.held_strip import HeldStrip
     from chamberopt.results.load import Result
 
 TIME = "time_to_98_s"
@@ -140,17 +139,17 @@ def expected_figures(result: Result) -> list[Figure]:
     ]
 
 
-def first_checks(result: Result, level_mm: int | None = None) -> Table:
+def first_checks(result: Result, held: HeldStrip | None = None) -> Table:
     """Return the quantities to measure before production, each with its expected value.
 
     Args:
-        level_mm: how far from the sonotrode strips are set, if that is known.
+        held: how strips are held in the place of the part, if that is known.
     """
-    rows = [(what, expected, "") for what, expected in _checks(result, level_mm)]
+    rows = [(what, expected, "") for what, expected in _checks(result, held)]
     return Table("", ("Measure first", "expected", "measured"), rows, numbers=False)
 
 
-def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
+def _checks(result: Result, held: HeldStrip | None) -> Iterator[Row]:
     design, calibration = result.design, result.design.calibration
     wanted = peak_to_valley(result)
     expected = f"{plain(wanted)} µm peak to valley"
@@ -182,41 +181,42 @@ def _checks(result: Result, level_mm: int | None) -> Iterator[Row]:
     intensity = result.metrics.get("almen_intensity")
     if intensity is None:
         rough = PredictedIntensity.of(result.metrics, calibration)
-        kind, known = "A", "not known before: calibrates to mmA"
+        kind, known = strip_for(design, result.metrics), "not known before: calibrates to mmA"
         if rough is not None:
-            kind = "N" if rough.is_for_n else "A"
-            known = rough.on_n_strips if rough.is_for_n else f"{plain(rough.value, 2)} mmA"
-            known += f"{rough.factor_in_words}, as impacts on the target would give"
-        strips = f"{kind} strips {_strip_times(result)}, to calibrate by"
-        if level_mm is not None:
-            strips = _in_the_lid(strips, design, level_mm)
-        yield strips, known
+            known = (
+                f"{rough.on_strips(kind)}{rough.factor_in_words}, at the target: not at the strip"
+            )
+        calibrates = ", to calibrate by" if kind == "A" else ""  # others do not tell mmA closely
+        strips = f"{_strips_in_words(kind, held)} {_strip_times(result)}{calibrates}"
+        yield strips if held is None else _in_the_lid(strips, held), known
     else:
         text = metric_label("almen_intensity").format(intensity)
         own = calibration.own_strips if calibration else ""
         strips = f"intensity by {f'a {own}' if own else 'A strips'} {_strip_times(result)}"
-        yield strips if level_mm is None else _in_the_lid(strips, design, level_mm, own), text
+        yield strips if held is None else _in_the_lid(strips, held, own), text
     masses = {plain(weighed_g(one.shot), 3): None for one in design.in_steps.values()}
     yield "mass of the shot, before and after", f"{' g, then '.join(masses)} g before"
 
 
-def _in_the_lid(strips: str, design: Design, level_mm: int, own: str = "") -> str:
-    """Return in words where strips are peened, or that none fits into the lid.
+def _strips_in_words(kind: StripType, held: HeldStrip | None) -> str:
+    """Return in words which strips of a type are peened, or pieces of them."""
+    is_cut = held is not None and held.size is not None and not held.is_whole
+    cut = f"pieces of {held.size_in_words} of " if held is not None and is_cut else ""
+    return f"{cut}{kind} strips"
+
+
+def _in_the_lid(strips: str, held: HeldStrip, own: str = "") -> str:
+    """Return in words where strips are peened, or that none has room in the lid.
 
     Args:
         strips: which, and after which times.
-        level_mm: that of first_checks.
         own: what the machine was calibrated with in the place of whole strips, if so.
     """
-    axis = strip_along(design)
-    if not (axis or own):
-        return (
-            f"intensity: no strip of {StripSize()} fits into the lid; by a small one or a coupon, "
-            "as under intensity in Acceptance"
-        )
-    along = " along y," if axis == "y" and not own else ""
-    where = f"in the lid in place of the part,{along} {level_mm} mm from the sonotrode, facing it"
-    return f"{strips}; {where}"
+    if held.size is None and not own:
+        return "intensity: no strip has room in the lid; by a coupon, as under Acceptance"
+    along = " along y," if held.along == "y" and not own else ""
+    level = f"{plain(held.level_mm)} mm from the sonotrode, facing it"
+    return f"{strips}; in the lid in place of the part,{along} {level}"
 
 
 def _over_ranges(result: Result, time: float) -> str:

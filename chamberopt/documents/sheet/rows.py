@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from chamberopt.design.part import Selection
     from chamberopt.design.shot import ShotTable
     from chamberopt.design.sonotrode import VibratingFace
+    from chamberopt.peening.held_strip import HeldStrip
     from chamberopt.results.load import Result
     from chamberopt.results.looked_places import LookedPlace
 
@@ -43,7 +44,7 @@ class AsBuilt(NamedTuple):
     plugs: Sequence[Plug] = ()  # of the mask
     usual: WantedIntensity | None = None  # Almen intensity of its metal and thickness
     later: Sequence[Sequence[Opening]] = ()  # openings in each further step
-    level_mm: int | None = None  # of the target above the sonotrode, where strips are set
+    held: HeldStrip | None = None  # an Almen strip in the place of the part, if it takes a lid
     radii: Sequence[float] = ()  # of the fillets that are the target [m]
     flat: FlatFace | None = None  # the part's largest, by which it is seen how it is turned
     is_ceiling: bool = False  # the part closes the room, which has no other ceiling

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from chamberopt.common.number_text import typeset_plain as plain
 from chamberopt.pictures.drawing.arrangement import (
     ABOVE,
     BELOW,
@@ -17,8 +18,9 @@ from chamberopt.pictures.drawing.arrangement import (
 )
 from chamberopt.pictures.drawing.cuts import section_planes
 from chamberopt.pictures.drawing.dimensions import Limits, Point
-from chamberopt.pictures.drawing.plan import draw_face, draw_plan, draw_strip
+from chamberopt.pictures.drawing.plan import draw_face, draw_plan
 from chamberopt.pictures.drawing.section import draw_section
+from chamberopt.pictures.drawing.strip import draw_strip, draw_strip_aside
 from chamberopt.pictures.drawing.view import View
 
 if TYPE_CHECKING:
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 
     from chamberopt.chamber.build import Chamber
     from chamberopt.design.sonotrode import Face
+    from chamberopt.peening.held_strip import HeldStrip
 
 RASTER = 200  # dots an inch, for the part in the plan
 LEGEND = (
@@ -43,14 +46,13 @@ class Shown(NamedTuple):
         face: on which the chamber stands, whose joints the plan shows, and its rim where it is
             larger than the floor and has room beside the plan.
         clearance_mm: round the part in its openings.
-        strip_along: "x" or "y" for an Almen strip in the plan, along it, in the place of the part;
-            "" for none.
+        held: an Almen strip in the place of the part, which section and plan show dotted.
     """
 
     limits: Limits = MappingProxyType({})
     face: Face | None = None
     clearance_mm: float = 0.0
-    strip_along: str = ""
+    held: HeldStrip | None = None
 
 
 NOTHING_BESIDE = Shown()
@@ -72,7 +74,7 @@ def draw_chamber(
         size: width and height that it may have.
         shown: what it shows beside the chamber.
     """
-    limits, face, clearance_mm, strip_along = shown
+    limits, face, clearance_mm, held = shown
     (low, high), has_jaws = ends_of(chamber), False
     planes = section_planes(chamber)
     scale, outside, needs, is_below = arrangement(chamber, planes, size)
@@ -87,6 +89,8 @@ def draw_chamber(
         corner = np.array([x + BESIDE + more[0], middle - 0.5 * (tall + more[2]) + 1.0])
         view = View(plane.right, scale, corner, low[axis], high[axis], more)
         has_jaws |= draw_section(axes, chamber, view, planes, number, limits, clearance_mm)
+        if held is not None and held.size is not None:
+            draw_strip_aside(axes, view, held)
         x = corner[0] + scale * (high - low)[plane.right] + more[1] + BESIDE
         if plane.right == 0:
             under = corner[0]
@@ -94,9 +98,13 @@ def draw_chamber(
     view = View(0, scale, corner, low[:2], high[:2], np.zeros(3))
     draw_plan(axes, chamber, view, planes, limits)
     strip = ""
-    if strip_along:
-        draw_strip(axes, view, strip_along)
-        strip = " Dotted in the plan: an Almen strip in its holder, which takes the part's place."
+    if held is not None and held.size is not None:
+        draw_strip(axes, view, held)
+        piece = "" if held.is_whole else "a piece of "
+        strip = (
+            f" Dotted: {piece}an Almen strip, {plain(held.level_mm)} mm from the sonotrode, on its "
+            "block, which takes the part's place, and in the plan the heads of its screws."
+        )
     dashed, beyond = ([], "") if face is None else draw_face(axes, chamber, view, face)
     text = scale_in_words(scale)
     what = "Section A–A" if len(planes) == 1 else "Sections A–A and B–B"

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chamberopt.common.number_text import typeset_plain as plain
-from chamberopt.design.almen_strip import STRIPS
 from chamberopt.design.shape_surface import TAG_PART, TAG_SONOTRODE, TAG_WALL
 from chamberopt.geometry.triangles import border_edges
 from chamberopt.pictures.charts.colours import BLACK, KINDS, SONOTRODE
@@ -102,18 +101,6 @@ def _draw_places(axes: Axes, chamber: Chamber, view: View) -> None:
             else:
                 x = corner[0] + view.scale * float((view.high - view.low)[0])
                 dimension(axes, (x, y1), (x, y2), -away, text, upright=True, before=low == wall)
-
-
-def draw_strip(axes: Axes, view: View, along: str) -> None:
-    """Draw the outline of an Almen strip, dotted, with its middle on the room's axis.
-
-    Args:
-        along: "x" or "y", along which it is long.
-    """
-    sides = 1e3 * np.array([STRIPS["A"].length, STRIPS["A"].width])
-    corners = 0.5 * sides * [[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]
-    corners = corners if along == "x" else corners[:, ::-1]
-    axes.plot(*view.place(corners).T, color=BLACK, lw=0.8, ls=(0, (1, 1.5)))
 
 
 def draw_face(axes: Axes, chamber: Chamber, view: View, face: Face) -> tuple[list[str], str]:

@@ -22,7 +22,6 @@ from chamberopt.design.load import load_design, save_design
 from chamberopt.documents.terminal_lines import strip_end
 from chamberopt.peening import virtual_strip
 from chamberopt.peening.strip import StripSize, strip_cells
-from chamberopt.peening.strip_holder import why_no_strip
 from chamberopt.peening.virtual_strip import VirtualStrip, peen_strip, strip_in_lid
 from chamberopt.printers import terminal
 from chamberopt.simulation.replicas import Replica, ReplicaSetting
@@ -236,10 +235,6 @@ def test_what_is_wrong_is_said_before_any_work(
     assert main([*words, "--out", str(tmp_path / "out")]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-    if options in ("", "--disc-mm 51"):  # as `new` tells before
-        size = StripSize() if not options else StripSize(0.051, 0.051, is_disc=True)
-        assert said in why_no_strip(SHORT, size)
-        assert why_no_strip(SHORT, StripSize(0.02, 0.02, is_disc=True)) == ""
 
 
 ZONE = {"name": "middle", "target": {"direction": [0.0, 0.0, -1.0], "angle_deg": [0.0, 10.0],

@@ -49,7 +49,8 @@ from chamberopt.documents.sheet import (
 from chamberopt.documents.sheet.acceptance import acceptance_rows
 from chamberopt.documents.sheet.expected import SHOP_NAMES, shop_name
 from chamberopt.documents.wording import metric_label, per_cent, plain
-from chamberopt.peening.strip_holder import strip_room
+from chamberopt.peening.held_strip import HeldStrip
+from chamberopt.peening.strip import StripSize
 from chamberopt.peening.tolerance_result import ToleranceResult, ToleratedFigure
 from chamberopt.pictures.drawing.chamber import Shown, draw_chamber
 from chamberopt.pictures.drawing.dimensions import with_limits
@@ -76,6 +77,10 @@ from tests.helpers.results.report_folders import simulated
 from tests.helpers.synthetic import machine_values, plate_design
 
 A4 = (595.28, 841.89)  # pt
+WHOLE = HeldStrip("A", StripSize(), "x", 31.0, 1.7)
+PIECE = WHOLE._replace(
+    size=StripSize(76e-3, 9e-3), along="y", why_no_whole="too narrow", walls="at −x"
+)
 MIX = ({"diameter_mm": 2.0, "share": 0.25}, {"diameter_mm": 3.0, "share": 0.75})
 
 
@@ -89,7 +94,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def rows_of(result: Result) -> dict[str, dict[str, str]]:
     """What the sheet says: value by name by title; sentences under ""."""
     found: dict[str, dict[str, str]] = {}
-    for table in (*setting_tables(result, AsBuilt((50.0,))), *limit_tables(result)):
+    for table in (
+        *setting_tables(result, AsBuilt((50.0,))),
+        *limit_tables(result, AsBuilt((50.0,))),
+    ):
         rows = found[table.caption] = {}
         for name, value in table.rows:
             rows[name] = f"{rows[name]} {value}" if name in rows else value
@@ -348,7 +356,7 @@ def test_what_to_measure_first_without_a_calibration(folder: Path) -> None:
     checks = {what.split()[0]: expected for what, expected, _ in rows}
     assert checks["amplitude"] == "50 µm peak to valley"
     assert checks["ball"].startswith("sonotrode 0.7")
-    assert "mmA, within a factor of 2.5, as impacts on" in checks["A"]  # no strips: only roughly
+    assert "mmA, within a factor of 2.5, at the target" in checks["A"]  # no strips: only roughly
     few = load_result(folder)
     few.metrics["strength_um"] = Estimate(5.0, 0.1)  # 0.0675 mmA, too little for strips of type A
     told = next(row for row in first_checks(few).rows if "strips" in row[0])
@@ -373,17 +381,17 @@ def test_what_to_measure_first_without_a_calibration(folder: Path) -> None:
 
 def test_strips_are_set_at_the_height_of_the_target(folder: Path) -> None:
     result = load_result(folder)
-    wide = result.design.changed({"chamber.diameter_mm": 140.0})
-    box = {"shape": "box", "length_mm": 39.5, "width_mm": 80.0, "height_mm": 60.0}
-    long = result.design.changed({"chamber": {**box, "sonotrode_distance_mm": 15.0}})
-    for design, told in (
-        (result.design, "intensity: no strip of 76.2 x 19 mm fits into the lid; by a small one"),
-        (wide, "; in the lid in place of the part, 31 mm from the sonotrode, facing it"),
-        (long, "; in the lid in place of the part, along y, 31 mm from the sonotrode, facing it"),
+    for held, told in (
+        (WHOLE._replace(size=None), "intensity: no strip has room in the lid; by a coupon, as"),
+        (WHOLE, "; in the lid in place of the part, 31 mm from the sonotrode, facing it"),
+        (PIECE, "; in the lid in place of the part, along y, 31 mm from the sonotrode, facing it"),
     ):
-        rows = first_checks(replace(result, design=design), 31).rows
+        rows = first_checks(result, held).rows
         (row,) = (what for what, *_ in rows if told in what)
-        assert ("strips after" in row) == (design is not result.design)  # no times without a strip
+        assert ("strips after" in row) == (held.size is not None)  # no times without a strip
+        assert ("pieces of 76 × 9 mm of A strips" in row) == (held is PIECE)
+    told = {what[:8]: expected for what, expected, _ in first_checks(result, WHOLE).rows}
+    assert "at the target: not at the strip" in told["A strips"]
 
 
 def test_the_first_part_sets_the_time_for_the_coverage_that_is_wanted(folder: Path) -> None:
@@ -412,11 +420,7 @@ def test_a_depth_is_told_no_closer_than_its_law_is_known(folder: Path) -> None:
 
 
 def test_a_part_is_accepted_by_places_shares_and_strips(folder: Path) -> None:
-    """The least covered patches come first, with what is seen there after half of the time to 98 %.
-
-    A chamber of 50 mm has room for a disc as wide, but for its facets; one of 140 mm for a whole
-    strip.
-    """
+    """The least covered patches come first, with what is seen there after half the time to 98 %."""
     result = load_result(folder)
     arrays = load_result_arrays(result)
     places = looked_places(arrays, 1e-6 * result.record.field.gauge_mm2)
@@ -435,7 +439,7 @@ def test_a_part_is_accepted_by_places_shares_and_strips(folder: Path) -> None:
     few = AsBuilt((50.0,), places=[one._replace(density=0.1) for one in places])
     assert "first part" not in dict(acceptance_rows(result, few))
     places = [one._replace(density=2.0 + k) for k, one in enumerate(places)]
-    built = AsBuilt((50.0,), level_mm=31, places=places)
+    built = AsBuilt((50.0,), held=PIECE, places=places)
     rows = dict(acceptance_rows(result, built))
     half = min(0.5 * result.metrics["time_to_98_s"].value, 5.0)
     assert f"stop it after {plain(half, 2)} s" in rows["first part"]
@@ -457,33 +461,64 @@ def test_a_part_is_accepted_by_places_shares_and_strips(folder: Path) -> None:
         (down, (), "simulate more room beside it and a larger distance from the sonotrode"),
         (down, (1e-3,), "simulate balls of at most 0.5 mm"),
     ):
-        lagging = AsBuilt((50.0,), level_mm=31, places=seen, radii=radii)
+        lagging = AsBuilt((50.0,), held=PIECE, places=seen, radii=radii)
         told = dict(acceptance_rows(result, lagging))["slowest place"]
         assert told.startswith("place 1 takes about 3 times as long as the target on average, and")
         assert told.endswith(remedy) or f"{remedy} (" in told
-    room = strip_room(result.design)
-    assert room is not None
-    assert room.disc == pytest.approx(50.0, rel=0.01)
-    assert f"or a disc of {room.disc:g} mm, cut from an A strip" in rows["intensity"]
-    assert "flush in a steel lid 31 mm from the sonotrode" in rows["intensity"]
-    assert "or a coupon (SAE AMS 2580A), a flat piece of the part's metal" in rows["intensity"]
-    wide = replace(result, design=result.design.changed({"chamber.diameter_mm": 140.0}))
-    told = dict(acceptance_rows(wide, built))["intensity"]
-    assert told.endswith("agree on a range in mmA by strips in the lid, as under Measure first")
-    assert "strip holder" not in rows
-    holder = dict(acceptance_rows(wide, built))["strip holder"]
-    assert holder.startswith("an A strip, 76.2 × 18.8 to 19.05 × 1.29 mm (SAE J442), lies flat on")
-    assert "its length along x, its peened face down and flush with the lid, 31 mm from" in holder
-    # A calibration tells the intensity, and yet no strip fits into this lid.
-    for one in (result, wide):
-        one.metrics.update(almen_intensity=Estimate(0.2, 0.01))
-    assert "no whole strip fits" in dict(acceptance_rows(result, built))["intensity"]
-    checks = [row[0] for row in first_checks(result, 31).rows]
-    assert any("fits into the lid; by a small one or a coupon" in one for one in checks)
-    assert dict(acceptance_rows(wide, built))["intensity"].endswith("the times of Measure first")
+    assert "no whole strip is held in the lid: too narrow. ACCEPT the first" in rows["intensity"]
+    assert "by pieces of 76 × 9 mm cut from A strips, held as under" in rows["intensity"]
+    assert (
+        "whole strips on the room's wall at −x; or by a coupon (SAE AMS 2580A), a flat piece"
+        in (rows["intensity"])
+    )
+    wide = built._replace(held=WHOLE)
+    told = dict(acceptance_rows(result, wide))["intensity"]
+    assert told.endswith("agree on a range in mmA by A strips in the lid, as under Measure first")
+    by_coupon = built._replace(held=WHOLE._replace(size=None, why_no_whole="too small"))
+    told = dict(acceptance_rows(result, by_coupon))["intensity"]
+    assert "too small. ACCEPT the first part by a coupon" in told
+    # A calibration tells the intensity, and yet no whole strip is held in this lid.
+    result.metrics.update(almen_intensity=Estimate(0.2, 0.01))
+    assert "no whole strip is held" in dict(acceptance_rows(result, built))["intensity"]
+    assert dict(acceptance_rows(result, wide))["intensity"].endswith("the times of Measure first")
     none = dict(acceptance_rows(result, AsBuilt((50.0,))))
     assert none["places to look at"].startswith("all of the target")
     assert "first part" not in none
+
+
+def test_the_holder_of_a_strip_is_described_on_a_page_with_room(folder: Path) -> None:
+    """One fact in one place: how high it is, how far its block stands down, and its screws."""
+    result = load_result(folder)
+
+    def told(built: AsBuilt) -> dict[str, str]:
+        tables = limit_tables(result, built)
+        return next((dict(one.rows) for one in tables if one.caption == "Strip holder"), {})
+
+    assert told(AsBuilt((50.0,))) == {}
+    rows = told(AsBuilt((50.0,), held=WHOLE))
+    assert rows["strip"].startswith("an A strip, 76.2 × 18.8 to 19.05 × 1.29 mm (SAE J442): its")
+    assert rows["strip"].endswith("its peened face down, 31 mm from the sonotrode's face")
+    assert "no opening. Its lower face, on which the strip lies, is 1.7 mm below" in rows["block"]
+    assert rows["screws"].startswith("four, M5, at 20.6 mm along and 12.1 mm across from")
+    aside = Opening("the wall", (0.06, 0.04), (0.0, 0.04, 0.03), 0.01, (0.0, 1.0, 0.0))
+    rows = told(AsBuilt((50.0,), (aside,), held=PIECE._replace(block_mm=0.0)))
+    assert rows["strip"].startswith("a piece of 76 × 9 mm, cut from an A strip")
+    assert "is flush with the ceiling" in rows["block"]
+    assert "no opening; those that the part leaves in the walls are closed flush" in rows["block"]
+
+
+def test_an_order_in_mmn_is_told_as_it_was_given(folder: Path) -> None:
+    """0.15-0.25N are 0.05 to 0.0833 mmA, and N strips measure them."""
+    result = load_result(folder)
+    low, high = WantedIntensity.parse("0.15-0.25N").low, WantedIntensity.parse("0.15-0.25N").high
+    ordered = replace(result, design=result.design.changed({"process.intensity_mmA": (low, high)}))
+    told = dict(acceptance_rows(ordered, AsBuilt((50.0,), held=WHOLE)))["intensity"]
+    assert told == (
+        "not accepted by coverage: ACCEPT 0.15 to 0.25 mmN (roughly 0.05 to 0.083 mmA) by N strips "
+        "in the lid, as under Measure first"
+    )
+    rows = [what for what, *_ in first_checks(ordered, WHOLE._replace(type="N")).rows]
+    assert any(one.startswith("N strips") and "calibrate" not in one for one in rows)
 
 
 def test_what_a_holder_bears_is_the_momentum_of_the_impacts(folder: Path) -> None:
@@ -533,12 +568,12 @@ def test_what_the_simulation_has_settled_is_told_no_more(
     assert len(open_matters(told)) == 1 + assumed
     assert [text for text in alarms(told) if text.startswith("1 matter")]
     assert own_warnings(told) == ["another"]
-    tables = {one.caption: one for one in limit_tables(told)}
+    tables = {one.caption: one for one in limit_tables(told, AsBuilt((50.0,)))}
     assert tables[Urgency.BEFORE_BUILDING.in_words].rows == [("", "NOT MASKED: ask.")]
     assert (Urgency.ASSUMED.in_words in tables) is bool(assumed)
     assert SETTLED not in tables
     kept = replace(told, design=design.changed({"to_settle": [], "settled": ["LONG (by phone)"]}))
-    (table,) = (one for one in limit_tables(kept) if one.caption == SETTLED)
+    (table,) = (one for one in limit_tables(kept, AsBuilt((50.0,))) if one.caption == SETTLED)
     assert table.rows == [("", "LONG (by phone)")]
 
 
@@ -647,6 +682,7 @@ def test_a_sheet_without_a_page_of_coverage_says_why(folder: Path) -> None:
         texts = [text for one in pages for text, _ in boxes_of(one)]
         told = "No page shows the coverage by place: no OpenGL library." in texts
         assert (told, "Coverage by place" in texts) == (not page, bool(page))
+        assert len(pages) == 2  # it is under the tables, as it has room there
 
 
 def test_a_part_that_lies_on_the_walls_leaves_one_tolerance(folder: Path) -> None:
@@ -664,7 +700,7 @@ def test_a_part_that_lies_on_the_walls_leaves_one_tolerance(folder: Path) -> Non
     ):
         ways: dict[str, Mounting] = {"the ceiling": "part goes in", "the wall": "lies on it"}
         built = AsBuilt((50.0,), openings, [ways[one.wall] for one in openings])
-        tables = [*setting_tables(result, built), *limit_tables(result, openings)]
+        tables = [*setting_tables(result, built), *limit_tables(result, built)]
         rows = {one.caption: dict(one.rows) for one in tables}
         follows = edge in openings
         assert rows["Chamber"]["opened at"] == lid
@@ -778,8 +814,8 @@ def test_it_is_an_a4_page_with_a_map_and_replaces_only_an_older_one(
     boxes = re.findall(rb"/MediaBox \[ ([\d. ]+) \]", content)
     for box in boxes:
         assert tuple(map(float, box.split())) == pytest.approx((0.0, 0.0, *A4), abs=0.02)
-    # Where the computer can draw in 3D, the coverage by place is under the tables, as it has room.
-    assert len(re.findall(rb"/Type /Page\b", content)) == len(boxes) == 2
+    # The holder of its strip leaves the coverage no room under the tables.
+    assert len(re.findall(rb"/Type /Page\b", content)) == len(boxes) == 2 + has_map
     assert (b"/Subtype /Image" in content) or not has_map
     assert b"/FontFile2" in content  # letters that can be selected, not their outlines
     precious = tmp_path / "precious.pdf"

@@ -10,6 +10,8 @@ from matplotlib.figure import Figure
 from chamberopt.chamber.build import build_chamber
 from chamberopt.design.sonotrode import Face
 from chamberopt.documents.wording import plain
+from chamberopt.peening.held_strip import HeldStrip
+from chamberopt.peening.strip import StripSize
 from chamberopt.pictures.drawing.chamber import Shown, draw_chamber, drawing_height, drawing_scale
 from chamberopt.pictures.drawing.cuts import section_planes
 from tests.helpers.drawings import on_sonotrode
@@ -76,8 +78,9 @@ def test_the_section_shows_the_part() -> None:
         told = draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0), Shown(face=face))
         assert told == f"{drawn}{text}"
     before = len(axes.lines)
-    told = draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0), Shown(strip_along="y"))
-    assert "Dotted in the plan: an Almen strip in its holder" in told
+    held = HeldStrip("A", StripSize(), "y", 12.0, 1.7)
+    told = draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0), Shown(held=held))
+    assert "Dotted: an Almen strip, 12 mm from the sonotrode, on its block" in told
     dotted = [one for one in axes.lines[before:] if len(one.get_xdata()) == 5]
     wide, tall = (float(np.ptp(ends)) for ends in (dotted[-1].get_xdata(), dotted[-1].get_ydata()))
     assert tall / wide == pytest.approx(76.2 / 19.0)
