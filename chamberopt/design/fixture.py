@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from pydantic import Field
 
@@ -21,6 +21,7 @@ from chamberopt.design.table_base import SI, FileTable
 SINK, LEAST_GAP_MM = 0.01, 0.1
 TIGHT_GAP, WIDEST_GAP = math.sqrt(1.0 - (1.0 - SINK) ** 2), 0.5
 USUAL_SHELL_MM = 1.0
+CUT_MM = 0.1  # width of the tolerance of an opening [mm], which a mill or a wire keeps
 
 
 def tight_gap_mm(ball_mm: float) -> float:
@@ -41,6 +42,46 @@ def slit_in_words(ball_mm: float) -> str:
 def slit_mm(ball_mm: float) -> float:
     """Return the widest gap [mm] beside a sonotrode, which may touch nothing, for such balls."""
     return math.floor(100.0 * WIDEST_GAP * ball_mm + 1e-9) / 100.0
+
+
+class OpeningCut(NamedTuple):
+    """How an opening is cut round a part that goes out through it, all in mm.
+
+    Attributes:
+        clearance_mm: all round the part; 0 for an opening that is fitted to it.
+        least_mm, most_mm: deviations of its size, by its tolerance.
+        corner_mm: largest radius of its inner corners, where the part has sharp ones.
+    """
+
+    clearance_mm: float = 0.0
+    least_mm: float = 0.0
+    most_mm: float = 0.0
+    corner_mm: float = 0.0
+
+    @property
+    def limits_in_words(self) -> str:
+        """The deviations of its size, such as "+0.1/0"; "" for one that is fitted to its part."""
+        least = f"−{plain(-self.least_mm)}" if self.least_mm else "0"
+        return f"+{plain(self.most_mm)}/{least}" if self.clearance_mm else ""
+
+
+def opening_cut(clearance_mm: float, ball_mm: float) -> OpeningCut:
+    """Return how an opening is cut round a part.
+
+    Its tolerance is CUT_MM wide, and lies above the size as far as no ball wedges, even where all
+    the play is on one side. A sharp corner of the part is by the clearance c from both sides of the
+    opening, and by r - (r - c) sqrt 2 from an inner corner of radius r. For r = 2 c that is 0.59 c.
+
+    Args:
+        clearance_mm: all round the part [mm].
+        ball_mm: diameter of the smallest balls [mm].
+    """
+    if not clearance_mm:
+        return OpeningCut()
+    room = max(0.0, WIDEST_GAP * ball_mm - 2.0 * clearance_mm)
+    most = math.floor(100.0 * min(CUT_MM, room) + 1e-9) / 100.0
+    least = min(round(CUT_MM - most, 2), clearance_mm)
+    return OpeningCut(clearance_mm, -least if least else 0.0, most, 2.0 * clearance_mm)
 
 
 # The keys that each kind of holder may have.

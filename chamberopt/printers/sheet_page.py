@@ -29,6 +29,7 @@ from chamberopt.documents.sheet import (
     AsBuilt,
     chamber_limits,
     clearance_of,
+    cut_of,
     drawn_openings,
     outlines_in_words,
     process_sheet,
@@ -327,7 +328,7 @@ def write_sheet(
         pages = draw_sheet(
             sheet,
             chamber,
-            Shown(limits, design.sonotrode.face, 1e3 * clear, held),
+            Shown(limits, design.sonotrode.face, cut_of(loaded), held),
             outlines,
             coverage_map(loaded.folder, 3 if outlines else VIEWS_A_ROW, places),
         )
@@ -418,7 +419,7 @@ def draw_sheet(
         else:
             y = Writer(last, 12.0).write("Openings", MARGIN, y - 6.0, INNER, bold=True) - 3.0
         scale = draw_openings(last, openings, MARGIN, y - CAPTION, (INNER, y - FOOT - CAPTION))
-        text = f"{outlines_in_words(shown_beside.clearance_mm)} Scale {scale}, dimensions in mm."
+        text = f"{outlines_in_words(shown_beside.opening)} Scale {scale}, dimensions in mm."
         Writer(last, 6.0).write(text, MARGIN, y, INNER, colour=DARK_GREY)
     for number, one in enumerate(pages, 1):
         (fields,) = block.content

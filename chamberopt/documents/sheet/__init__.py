@@ -9,7 +9,12 @@ from chamberopt.documents.sheet.document import (
     title_block,
 )
 from chamberopt.documents.sheet.expected import calibrated_to, first_checks
-from chamberopt.documents.sheet.openings import clearance_of, drawn_openings, outlines_in_words
+from chamberopt.documents.sheet.openings import (
+    clearance_of,
+    cut_of,
+    drawn_openings,
+    outlines_in_words,
+)
 from chamberopt.documents.sheet.rows import AsBuilt, amplitude_text, key_row
 from chamberopt.documents.sheet.settings import chamber_limits, reference_limits, slit_limits
 from chamberopt.documents.sheet.warned import alarms, cautions
@@ -23,6 +28,7 @@ __all__ = [
     "cautions",
     "chamber_limits",
     "clearance_of",
+    "cut_of",
     "design_sha256",
     "drawn_openings",
     "first_checks",

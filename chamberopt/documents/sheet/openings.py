@@ -11,6 +11,7 @@ import numpy as np
 from chamberopt.chamber.checks.openings import EDGE, PLATE, thin_ribs, walls_end_at
 from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.fixture import plugs_in_words, size_in_words
+from chamberopt.design.fixture import OpeningCut, opening_cut, slit_mm
 from chamberopt.documents.sheet.rows import MOST_ROWS, AsBuilt, Row, first_rows
 from chamberopt.documents.wording import plain
 
@@ -65,6 +66,8 @@ def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         beyond += _across(result, way)
         rows.append(("opening", f"{cut} at {place_of(way, openings)} mm; {beyond}"))
     yield from first_rows(rows, "openings")
+    if clearance_of(result) and not all(one.is_end for one in openings):
+        yield "cut to", _cut_in_words(result, openings)
     if ribs := thin_ribs(openings):
         between = " and ".join(
             f"{plain(1e3 * rib.width, 2)} mm between those in {_wall_of(rib.one)} and "
@@ -176,6 +179,23 @@ def clearance_of(result: Result) -> float:
     return 0.0 if holder is None else holder.clearance
 
 
+def cut_of(result: Result) -> OpeningCut:
+    """Return how the openings through which the part goes out are cut."""
+    return opening_cut(1e3 * clearance_of(result), 1e3 * min(result.design.ball_diameters))
+
+
+def _cut_in_words(result: Result, openings: Sequence[Opening]) -> str:
+    """Return in words how closely openings are cut, and how round their inner corners may be."""
+    cut, corners = cut_of(result), ""
+    if any(one.form == "rectangle" and not one.is_end for one in openings):
+        corners = f"; inner corners at most R {plain(cut.corner_mm)} mm, so wire-cut or filed"
+    widest = plain(slit_mm(1e3 * min(result.design.ball_diameters)))
+    return (
+        f"{cut.limits_in_words} mm on the sizes of openings, as balls wedge in gaps above {widest} "
+        f"mm, half a ball{corners}"
+    )
+
+
 def lid_in_words(built: AsBuilt) -> str:
     """Return in words how the chamber opens: by its lid, the part, or where its walls are split."""
     openings, mountings = built.openings, built.mountings
@@ -246,9 +266,11 @@ def _wall_of(one: Opening) -> str:
     return one.wall if one.wall == CEILING else f"{one.wall}{at}"
 
 
-def outlines_in_words(clearance_mm: float) -> str:
+def outlines_in_words(cut: OpeningCut) -> str:
     """Return what the outlines of openings show, with what is cut beyond them."""
-    wider = f": cut it {plain(clearance_mm)} mm wider all round" if clearance_mm else ""
+    wider, clear = "", cut.clearance_mm
+    if clear:
+        wider = f": cut it {plain(clear)} mm wider all round, {cut.limits_in_words} on its sizes"
     return (
         f"What the part fills of the wall, seen from outside, without clearance{wider}. Dashed: "
         "where it goes on over an edge of the wall. Small: corners, from the lower left."

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from chamberopt.common.number_text import typeset_plain as plain
+from chamberopt.design.fixture import OpeningCut
 from chamberopt.pictures.drawing.arrangement import (
     ABOVE,
     BELOW,
@@ -45,13 +46,13 @@ class Shown(NamedTuple):
         limits: what the keys of [chamber] may be, for dimensions that show one of them.
         face: on which the chamber stands, whose joints the plan shows, and its rim where it is
             larger than the floor and has room beside the plan.
-        clearance_mm: round the part in its openings.
+        opening: how the openings round the part are cut.
         held: an Almen strip in the place of the part, which section and plan show dotted.
     """
 
     limits: Limits = MappingProxyType({})
     face: Face | None = None
-    clearance_mm: float = 0.0
+    opening: OpeningCut = OpeningCut()
     held: HeldStrip | None = None
 
 
@@ -74,7 +75,7 @@ def draw_chamber(
         size: width and height that it may have.
         shown: what it shows beside the chamber.
     """
-    limits, face, clearance_mm, held = shown
+    limits, face, opening, held = shown
     (low, high), has_jaws = ends_of(chamber), False
     planes = section_planes(chamber)
     scale, outside, needs, is_below = arrangement(chamber, planes, size)
@@ -88,7 +89,7 @@ def draw_chamber(
         axis = np.array([plane.right, 2])
         corner = np.array([x + BESIDE + more[0], middle - 0.5 * (tall + more[2]) + 1.0])
         view = View(plane.right, scale, corner, low[axis], high[axis], more)
-        has_jaws |= draw_section(axes, chamber, view, planes, number, limits, clearance_mm)
+        has_jaws |= draw_section(axes, chamber, view, planes, number, limits, opening)
         if held is not None and held.size is not None:
             draw_strip_aside(axes, view, held)
         x = corner[0] + scale * (high - low)[plane.right] + more[1] + BESIDE

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from chamberopt.chamber.build import Chamber
+    from chamberopt.design.fixture import OpeningCut
 
 WIDER = 0.1  # mm: a cavity that is wider than its sonotrode by more has its own dimension
 BEYOND = 0.1  # mm on paper that a part goes on at least where it is broken off
@@ -61,14 +62,14 @@ def draw_section(
     planes: Sequence[SectionPlane],
     number: int,
     limits: Limits,
-    clearance_mm: float,
+    opening: OpeningCut,
 ) -> bool:
     """Draw a section. Return whether jaws are in it, which hold the part outside.
 
     Args:
         planes: planes of all sections.
         number: of this section among them, from 0.
-        limits, clearance_mm: those of draw_chamber.
+        limits, opening: those of draw_chamber.
     """
     at, name = planes[number].at, "AB"[number]
     other = 1 - view.right
@@ -92,7 +93,7 @@ def draw_section(
     above += float(top)
     across_line(axes, (axis_at, y - FACE - 1.0), (axis_at, above + 1.0))
     words = f"{name}–{name}: {'xy'[view.right]} to the right, z up"
-    is_dimensioned = _draw_ceiling(axes, chamber, view, above, clearance_mm)
+    is_dimensioned = _draw_ceiling(axes, chamber, view, above, opening)
     label(axes, view.corner[0], above + 2.5 + OPENING * is_dimensioned, words)
     # The sonotrode is a band below its mean face, at z = 0.
     face_wide = 0.0
@@ -150,22 +151,23 @@ def _as_far(height: float, lowest: float, limits: Limits) -> str:
 
 
 def _draw_ceiling(
-    axes: Axes, chamber: Chamber, view: View, above: float, clearance_mm: float
+    axes: Axes, chamber: Chamber, view: View, above: float, opening: OpeningCut
 ) -> bool:
     """Dimension the opening of the ceiling above a section. Return whether there is one.
 
     Args:
         above: height on the page of the part's upper end [mm].
-        clearance_mm: round the part in it.
+        opening: how it is cut.
     """
     room = float((view.high - view.low)[0])
     for one in find_openings(chamber):
-        wide = 1e3 * one.size[view.right] + 2.0 * clearance_mm
+        wide = 1e3 * one.size[view.right] + 2.0 * opening.clearance_mm
         if one.wall == CEILING and one.form in ("rectangle", "round") and wide < room - WIDER:
             middle, top = 1e3 * one.place[view.right], float(view.high[1])
             ends = view.place([[middle - 0.5 * wide, top], [middle + 0.5 * wide, top]])
             (low, y), (high, _) = ends.tolist()
             text = f"{'Ø ' * (one.form == 'round')}{plain(round(wide, 1))}"
+            text = f"{text} {opening.limits_in_words}".strip()
             dimension(axes, (low, y), (high, y), y - above - OPENING, text)
             return True
     return False

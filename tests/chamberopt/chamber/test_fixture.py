@@ -1,5 +1,6 @@
 """A holder and a mask take their volume out of the cavity, and nothing of the target."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.scene import build_scene, chamber_mesh, part_rotation, require_turnable
 from chamberopt.common.errors import InputError
 from chamberopt.design.design import Design, validate
-from chamberopt.design.fixture import TIGHT_GAP, WIDEST_GAP
+from chamberopt.design.fixture import TIGHT_GAP, WIDEST_GAP, opening_cut
 from chamberopt.design.load import load_design
 from chamberopt.design.shapes import TAG_PART, TAG_WALL
 from chamberopt.geometry.triangles import area_vectors, areas
@@ -343,6 +344,23 @@ def test_balls_hardly_sink_into_a_tight_gap_and_wedge_in_no_allowed_one() -> Non
         sunk = radius - np.sqrt(radius**2 - 0.25 * gap**2)
         assert sunk == pytest.approx(depth, abs=5e-5)
     assert np.degrees(np.arcsin(WIDEST_GAP)) == pytest.approx(30.0)
+
+
+def test_an_opening_has_a_tolerance_in_which_no_ball_wedges_and_the_part_goes_in() -> None:
+    """All the play on one side is at most half a ball, and a sharp corner is free of a round."""
+    for clear, ball, told in (
+        (0.15, 1.2, "+0.1/0"),
+        (0.1, 0.5, "+0.05/−0.05"),
+        (0.1, 0.4, "+0/−0.1"),
+        (0.2, 3.0, "+0.1/0"),
+    ):
+        cut = opening_cut(clear, ball)
+        assert cut.limits_in_words == told
+        assert 2.0 * clear + cut.most_mm <= 0.5 * ball + 1e-9
+        assert 2.0 * clear + cut.least_mm > 0.0
+        r = cut.corner_mm
+        assert r - (r - clear) * math.sqrt(2.0) > 0.5 * clear
+    assert opening_cut(0.0, 1.2).limits_in_words == ""
 
 
 def test_a_round_holder_on_the_axis_turns_with_the_part(parts: Path) -> None:

@@ -185,6 +185,10 @@ def test_openings_and_the_gap_round_the_part(folder: Path) -> None:
     assert section == "along the part's section, within 60 × 80 mm without clearance,"
     assert "it widens to 61.2 × 80 mm within 10 mm outside" in dict(told)["opening"]
     assert "0.2 mm of clearance all round, in the sizes below" in dict(rows)["holder"]
+    assert dict(rows)["cut to"] == (
+        "+0.1/0 mm on the sizes of openings, as balls wedge in gaps above 1.5 mm, half a ball; "
+        "inner corners at most R 0.4 mm, so wire-cut or filed"
+    )
     assert dict(rows)["gaps"].startswith("round the part as above, of all other joints at most 0.4")
     assert rows_of(result)["Chamber"]["gaps"].startswith("of joints and openings at most 0.42 mm")
 

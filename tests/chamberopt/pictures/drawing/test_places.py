@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from chamberopt.chamber.build import Chamber, build_chamber
 from chamberopt.chamber.layout.grip import Clamp, outside_clamp
+from chamberopt.design.fixture import OpeningCut
 from chamberopt.pictures.drawing import section
 from chamberopt.pictures.drawing.arrangement import WALL, arrangement
 from chamberopt.pictures.drawing.centres import Centre, centres, distinct, gaps
@@ -68,9 +69,11 @@ def test_a_second_section_shows_the_lid_beside_a_part_as_wide_as_the_room(tmp_pa
     chamber = room_with(plate, tmp_path, (0.0, 0.0), holder={"kind": "bore", "clearance_mm": 0.2})
     assert [one.right for one in section_planes(chamber)] == [1, 0]
     axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
-    told = draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0), Shown(clearance_mm=0.2))
+    told = draw_chamber(
+        axes, chamber, 0.0, 70.0, (190.0, 70.0), Shown(opening=OpeningCut(0.2, 0.0, 0.1))
+    )
     assert told.startswith("Sections A–A and B–B")
-    assert [one.get_text() for one in axes.texts].count("24.4") == 1
+    assert [one.get_text() for one in axes.texts].count("24.4 +0.1/0") == 1
 
 
 def test_a_bar_through_a_side_wall_has_its_axis_and_its_end_dimensioned(tmp_path: Path) -> None:
