@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from chamberopt.chamber.checks.openings import find_openings, walls_end_at
 from chamberopt.common.number_text import typeset_plain as plain
 from chamberopt.design.fixture import OpeningCut
 from chamberopt.pictures.drawing.arrangement import (
@@ -103,13 +104,15 @@ def draw_chamber(
         draw_strip(axes, view, held)
         piece = "" if held.is_whole else "a piece of "
         strip = (
-            f" Dotted: {piece}an Almen strip, {plain(held.level_mm)} mm from the sonotrode, on its "
-            "block, which takes the part's place, and in the plan the heads of its screws."
+            f" Dotted: {piece}an Almen strip, {plain(held.level_mm)} mm from the sonotrode, with "
+            "its block and screws."
         )
     dashed, beyond = ([], "") if face is None else draw_face(axes, chamber, view, face)
     text = scale_in_words(scale)
     what = "Section A–A" if len(planes) == 1 else "Sections A–A and B–B"
-    jaws = " White and crossed: jaws." if has_jaws else ""
+    lies = walls_end_at(find_openings(chamber)) is not None
+    kind = "clamps, down on the walls" if lies else "jaws"
+    jaws = f" White and crossed: {kind}." if has_jaws else ""
     dashes = f" Dashed: {' and '.join(dashed)}." if dashed else ""
     rim = f" Not drawn: {beyond}." if beyond else ""
     return f"{what} and plan, scale {text}.{dashes}{strip}{rim}{jaws}"

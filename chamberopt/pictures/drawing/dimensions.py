@@ -23,7 +23,7 @@ SHORT = 9.0  # mm: a shorter dimension has its arrows outside
 STUB = 3.5  # mm, of arrows outside
 # mm, width of a letter, about, and of the arrows and the line beside a text that breaks it; and how
 # far beyond its line a text is that leaves no room for them
-LETTER, ARROWS, BEYOND = 1.25, 5.0, 1.7
+LETTER, ARROWS, BESIDE_LINE = 1.25, 5.0, 1.7
 
 
 def dimension(
@@ -62,16 +62,21 @@ def dimension(
     else:
         ends = [(x1 - STUB, x1, "-|>"), (x2 + STUB, x2, "-|>"), (x1, x2, "-")]
         place = x1 - STUB - 1.0 if before else x2 + STUB + 1.0
-    fits = not middle or x2 - x1 >= LETTER * len(text) + ARROWS
+    fits = not middle or fits_in_line(x2 - x1, text)
     for a, b, style in ends:
         arrowed = {**arrow, "arrowstyle": style}
         axes.annotate("", turn(b, line), turn(a, line), arrowprops=arrowed, annotation_clip=False)
     inline = {"fc": "white", "ec": "none", "pad": 0.6}
-    x, y = turn(place, line if fits else line - past * BEYOND)
+    x, y = turn(place, line if fits else line - past * BESIDE_LINE)
     ha = "center" if middle or upright else "right" if before else "left"
     va = "center" if middle or not upright else "top" if before else "bottom"
     rotation = 90.0 if upright else 0.0
     axes.text(x, y, text, size=SIZE, ha=ha, va=va, rotation=rotation, bbox=inline, parse_math=False)
+
+
+def fits_in_line(length: float, text: str) -> bool:
+    """Return whether a dimension has room for its text in its line."""
+    return length >= LETTER * len(text) + ARROWS
 
 
 def across_line(axes: Axes, start: Point, end: Point, name: str = "") -> None:

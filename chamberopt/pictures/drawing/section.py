@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chamberopt.chamber.checks.openings import find_openings
+from chamberopt.chamber.checks.openings import find_openings, walls_end_at
 from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.fixture import size_in_words
 from chamberopt.chamber.layout.grip import outside_clamp
@@ -23,6 +23,7 @@ from chamberopt.pictures.drawing.dimensions import (
     Limits,
     across_line,
     dimension,
+    fits_in_line,
     reference,
     toleranced,
     with_limits,
@@ -34,24 +35,29 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from chamberopt.chamber.build import Chamber
+    from chamberopt.chamber.checks.openings import Opening
     from chamberopt.design.fixture import OpeningCut
 
 WIDER = 0.1  # mm: a cavity that is wider than its sonotrode by more has its own dimension
 BEYOND = 0.1  # mm on paper that a part goes on at least where it is broken off
 BREAK, WAVE = 0.5, 3.0  # mm, height and length of the waves of a line where the part is broken off
-# mm on paper: jaws that hold the part outside begin so far from the wall, with so much of it beyond
-# them, and are so long and thick.
-JAWS_FROM, JAWS_LONG, JAWS_THICK = 2.5, 4.0, 2.0
+# mm on paper: jaws that hold the part outside begin so far from the wall, are so long where it
+# stands out so far, as long as that at least, and so thick.
+JAWS_FROM, JAWS_LONG, JAWS_LEAST, JAWS_THICK = 2.5, 4.0, 2.0, 2.0
 # They are drawn where the part's sides are parallel, at so many places, within so many mm on paper.
 JAW_PLACES, JAWS_OFF = 5, 0.2
+INSIDE = 1e-3  # mm on paper: so far inside of its end a part is looked at
 JAWS = "xxxxxx"  # their hatch
+OF_JAWS: dict[str, Any] = {"facecolor": "white", "edgecolor": BLACK, "hatch": JAWS, "lw": 0.7}
 PRESSED = 0.9  # cosine from which on jaws press along an axis
 # mm on paper from the walls to the first dimension of a height, and to each further one.
 FIRST_ROW, ROWS = 4.0, 4.2
 CROSS = 4.0  # mm on paper, of the lines that cross in the middle of an opening
 MOST_CENTRES = 1  # heights of openings on each side of a section
 LETTER = 1.0  # mm on paper, width of a letter of a name of a holder
-OPENING = 3.0  # mm on paper, from the part to the dimension of the opening above it
+# mm on paper, from the part to the dimension of the opening above it, and what that takes more where
+# its text stands above its line
+OPENING, ABOVE_LINE = 3.0, 0.8
 ROOM = "#e8f1f7"
 
 
@@ -64,7 +70,7 @@ def draw_section(
     limits: Limits,
     opening: OpeningCut,
 ) -> bool:
-    """Draw a section. Return whether jaws are in it, which hold the part outside.
+    """Draw a section. Return whether jaws or clamps are in it, which hold the part outside.
 
     Args:
         planes: planes of all sections.
@@ -82,7 +88,11 @@ def draw_section(
     look: Any = {"facecolor": PART, "edgecolor": DARK_GREY, "hatch": "////", "lw": 0.5}
     fill(axes, view, inside(1e3 * own), window, **look)
     _draw_breaks(axes, view, own)
-    has_jaws = "holder" not in chamber.fixtures and _draw_jaws(axes, chamber, view, own)
+    has_jaws = "holder" not in chamber.fixtures
+    if has_jaws and walls_end_at(find_openings(chamber)) is not None:
+        has_jaws = _draw_clamps(axes, chamber, view, own)
+    elif has_jaws:
+        has_jaws = _draw_jaws(axes, chamber, view, own)
     tags, target = chamber.tags[row], chamber.on_target[row]
     draw_lines(axes, view, lines[tags == TAG_WALL], BLACK, 1.1)
     draw_lines(axes, view, lines[tags > TAG_WALL], SONOTRODE, 2.5)
@@ -93,8 +103,8 @@ def draw_section(
     above += float(top)
     across_line(axes, (axis_at, y - FACE - 1.0), (axis_at, above + 1.0))
     words = f"{name}–{name}: {'xy'[view.right]} to the right, z up"
-    is_dimensioned = _draw_ceiling(axes, chamber, view, above, opening)
-    label(axes, view.corner[0], above + 2.5 + OPENING * is_dimensioned, words)
+    dimensioned = _draw_ceiling(axes, chamber, view, above, opening)
+    label(axes, view.corner[0], above + 2.5 + dimensioned, words)
     # The sonotrode is a band below its mean face, at z = 0.
     face_wide = 0.0
     face = 1e3 * lines[tags == TAG_SONOTRODE][..., 0]
@@ -152,8 +162,8 @@ def _as_far(height: float, lowest: float, limits: Limits) -> str:
 
 def _draw_ceiling(
     axes: Axes, chamber: Chamber, view: View, above: float, opening: OpeningCut
-) -> bool:
-    """Dimension the opening of the ceiling above a section. Return whether there is one.
+) -> float:
+    """Dimension the opening of the ceiling above a section. Return its height there [mm on paper].
 
     Args:
         above: height on the page of the part's upper end [mm].
@@ -169,8 +179,8 @@ def _draw_ceiling(
             text = f"{'Ø ' * (one.form == 'round')}{plain(round(wide, 1))}"
             text = f"{text} {opening.limits_in_words}".strip()
             dimension(axes, (low, y), (high, y), y - above - OPENING, text)
-            return True
-    return False
+            return OPENING if fits_in_line(high - low, text) else OPENING + ABOVE_LINE
+    return 0.0
 
 
 def _draw_centres(
@@ -248,10 +258,11 @@ def _draw_jaws(axes: Axes, chamber: Chamber, view: View, lines: np.ndarray) -> b
         stands_out = way * (beyond[int(way > 0.0)][axis] - wall)
         press = 2 if axis == 0 else view.right
         is_held = pressed is None or abs(pressed[press]) > PRESSED
-        if not is_held or min(drawn, stands_out) < JAWS_FROM + JAWS_LONG:
+        long = min(JAWS_LONG, drawn - JAWS_FROM, stands_out - JAWS_FROM)
+        if not is_held or long < JAWS_LEAST:
             continue
         start = wall + way * JAWS_FROM
-        zone = np.linspace(start, start + way * JAWS_LONG, JAW_PLACES)
+        zone = np.linspace(start, start + way * (long - INSIDE), JAW_PLACES)
         crossed = [_crossings(ends, axis, place) for place in zone]
         if not all(map(len, crossed)):
             continue
@@ -264,12 +275,37 @@ def _draw_jaws(axes: Axes, chamber: Chamber, view: View, lines: np.ndarray) -> b
             continue
         has_jaws = True
         for edge, outwards in zip(edges[0], (-1.0, 1.0), strict=True):
-            corner = min(start, start + way * JAWS_LONG), min(edge, edge + outwards * JAWS_THICK)
-            size = JAWS_LONG, JAWS_THICK
+            corner = min(start, start + way * long), min(edge, edge + outwards * JAWS_THICK)
+            size = long, JAWS_THICK
             x, wide = (corner, size) if axis == 0 else (corner[::-1], size[::-1])
-            look: Any = {"facecolor": "white", "edgecolor": BLACK, "hatch": JAWS, "lw": 0.7}
-            axes.add_patch(Rectangle(x, *wide, **look))
+            axes.add_patch(Rectangle(x, *wide, **OF_JAWS))
     return has_jaws
+
+
+def _draw_clamps(axes: Axes, chamber: Chamber, view: View, lines: np.ndarray) -> bool:
+    """Draw a clamp on the part over each wall on which it lies. Return whether there is any.
+
+    Args:
+        lines: lines of the part's section, (k, 2, 2) [m].
+    """
+    from matplotlib.patches import Rectangle
+
+    ends, has_clamps = view.place(1e3 * lines), False
+    low, high = view.place([view.low, view.high])
+    for way, wall in ((-1.0, low[0]), (1.0, high[0])):
+        middle = wall + 0.5 * way * WALL
+        crossed = _crossings(ends, 0, middle)
+        lies = any(one.is_end and way * one.way[view.right] > PRESSED for one in _aside(chamber))
+        if lies and len(crossed):
+            corner = middle - 0.5 * JAWS_LONG, float(crossed[-1])
+            axes.add_patch(Rectangle(corner, JAWS_LONG, JAWS_THICK, **OF_JAWS))
+            has_clamps = True
+    return has_clamps
+
+
+def _aside(chamber: Chamber) -> list[Opening]:
+    """Return the openings of a chamber's side walls."""
+    return [one for one in find_openings(chamber) if one.wall != CEILING]
 
 
 def _crossings(ends: np.ndarray, axis: int, place: float, beyond: float = 0.0) -> np.ndarray:

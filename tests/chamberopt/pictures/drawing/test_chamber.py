@@ -80,7 +80,7 @@ def test_the_section_shows_the_part() -> None:
     before = len(axes.lines)
     held = HeldStrip("A", StripSize(), "y", 12.0, 1.7)
     told = draw_chamber(axes, chamber, 0.0, 100.0, (180.0, 100.0), Shown(held=held))
-    assert "Dotted: an Almen strip, 12 mm from the sonotrode, on its block" in told
+    assert "Dotted: an Almen strip, 12 mm from the sonotrode, with its block" in told
     dotted = [one for one in axes.lines[before:] if len(one.get_xdata()) == 5]
     wide, tall = (float(np.ptp(ends)) for ends in (dotted[-1].get_xdata(), dotted[-1].get_ydata()))
     assert tall / wide == pytest.approx(76.2 / 19.0)

@@ -9,7 +9,7 @@ import trimesh
 from matplotlib.figure import Figure
 
 from chamberopt.chamber.build import Chamber, build_chamber
-from chamberopt.chamber.layout.grip import Clamp, outside_clamp
+from chamberopt.chamber.layout.grip import ON_WALLS, Clamp, outside_clamp
 from chamberopt.design.fixture import OpeningCut
 from chamberopt.pictures.drawing import section
 from chamberopt.pictures.drawing.arrangement import WALL, arrangement
@@ -144,3 +144,36 @@ def test_jaws_are_drawn_on_the_faces_that_are_clamped(
     assert np.abs(outside_clamp(chamber).way or 0.0) == pytest.approx([0.0, 1.0, 0.0])
     monkeypatch.setattr(section, "outside_clamp", lambda _: Clamp("", way=way))
     assert (JAWS in texts_of(chamber)[1]) == are_drawn
+
+
+def test_what_lies_on_the_walls_is_clamped_from_above_alone(tmp_path: Path) -> None:
+    """A plate of 60 x 6 x 6 mm lies on both walls across x: a clamp over each, none below."""
+    bar = trimesh.creation.box((60.0, 6.0, 6.0))
+    bar.export(tmp_path / "part.stl")
+    design = plate_design().changed({
+        "part": {"mesh": str(tmp_path / "part.stl"), "unit": "mm"},
+        "chamber": {**ROOM, "sonotrode_distance_mm": 29.8},
+        "holder": {"kind": "bore", "clearance_mm": 0.2},
+    })  # fmt: skip
+    chamber = build_chamber(design)
+    assert outside_clamp(chamber).text == ON_WALLS
+    axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
+    told = draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0))
+    clamps = [one for one in axes.patches if one.get_hatch() == JAWS]
+    assert len(clamps) == 2
+    assert clamps[0].get_y() == pytest.approx(clamps[1].get_y())
+    assert "White and crossed: clamps, down on the walls." in told
+
+
+def test_jaws_are_as_long_as_what_stands_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At 1:1, 5.5 mm stand out: jaws of 4 mm would reach beyond the end of the part."""
+    monkeypatch.setattr(section, "outside_clamp", lambda _: Clamp(""))
+    for out, long in ((3.5, None), (5.5, 3.0), (20.0, 4.0)):
+        bar = trimesh.creation.box((9.0, 9.0, 20.0 + out))
+        chamber = room_with(bar, tmp_path, (0.0, 0.0))
+        axes = Figure().add_axes((0.0, 0.0, 1.0, 1.0))
+        draw_chamber(axes, chamber, 0.0, 80.0, (190.0, 80.0))
+        jaws = [one.get_height() for one in axes.patches if one.get_hatch() == JAWS]
+        assert jaws == ([] if long is None else [pytest.approx(long)] * 2)
