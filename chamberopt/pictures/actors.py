@@ -112,6 +112,12 @@ def _add_zones(plotter: Any, part: DrawnPart) -> list[Any]:
     return actors
 
 
+def add_body(plotter: Any, chamber: Surface, name: str) -> Any:
+    """Add a chamber's "holder" or "mask" to a plotter, and return its actor."""
+    look = {"color": FIXTURE_COLOURS[name], "ambient": 0.45, "diffuse": 0.6, "pickable": False}
+    return plotter.add_mesh(fixture_body(chamber, name), **look, **NO_RENDER)
+
+
 def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:
     """Add a chamber to a plotter: sonotrodes, holder and mask, and walls as glass with edges.
 
@@ -132,8 +138,7 @@ def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[An
         actors.append(plotter.add_mesh(face, culling="back", opacity=FROM_OUTSIDE, **look))
     for name, own in fixture_marks(chamber).items():
         glass &= ~own
-        look = {"color": FIXTURE_COLOURS[name], "ambient": 0.45, "diffuse": 0.6, **style}
-        actors.append(plotter.add_mesh(fixture_body(chamber, name), **look))
+        actors.append(add_body(plotter, chamber, name))
     wall = chamber.extract_cells(glass).extract_surface(algorithm="dataset_surface")
     edges = wall.extract_feature_edges(SHARP_EDGE, non_manifold_edges=False, manifold_edges=False)
     if JOINTS in chamber.field_data:

@@ -65,16 +65,19 @@ def render_coverage(job: dict[str, Any]) -> None:
     targets = [target_in_chamber(one.part) for one in results]
     views = choose_views(targets, chambers)
     rows = []
-    for part, chamber, title in zip(parts, chambers, job["titles"], strict=True):
+    for one, part, title in zip(results, parts, job["titles"], strict=True):
+        mask = one.chamber.fixtures.get("mask")
+        has_plugs = mask is not None and mask.kind == "plugs"
 
         def add(plotter: Any, part: DrawnPart = part) -> None:
             add_part(plotter, part, limits)
             add_edges(plotter, part.surface)
 
         marks = [(str(k), np.reshape(one, (1, 6))) for k, one in enumerate(job["marks"], 1)]
+        surfaces = part.inside, part.surface, one.cavity
         panels = [
-            one._replace(marks=seen_marks(marks, part.surface, one.view))
-            for one in part_panels(add, part.inside, part.surface, chamber, views, job["finer"])
+            panel._replace(marks=seen_marks(marks, part.surface, panel.view))
+            for panel in part_panels(add, *surfaces, views, has_plugs, job["finer"])
         ]
         for first in range(0, len(panels), job["columns"]):
             shown = panels[first : first + job["columns"]]

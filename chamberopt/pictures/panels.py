@@ -9,7 +9,8 @@ import numpy as np
 
 from chamberopt.chamber.checks.openings import EDGE
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
-from chamberopt.pictures.actors import add_chamber
+from chamberopt.geometry.triangles import unit_normals
+from chamberopt.pictures.actors import add_body, add_chamber
 from chamberopt.pictures.camera import (
     cells_of,
     chamber_view,
@@ -69,6 +70,7 @@ def part_panels(
     part: Surface,
     chamber: Surface,
     views: tuple[np.ndarray, Sequence[np.ndarray]],
+    has_plugs: bool = False,
     finer: int = 1,
 ) -> list[Panel]:
     """Draw the part in its chamber with dimensions, and its target from near, as panels of a page.
@@ -78,11 +80,18 @@ def part_panels(
         target, part, chamber: surfaces that the views must hold.
         views: the direction to the eye that shows the chamber, and one or two directions that show
             the target from near.
+        has_plugs: the mask is of plugs, which fill holes from near too. Others would hide the part.
         finer: that of View.
     """
+
+    def add_plugged(plotter: Any) -> None:
+        add(plotter)
+        if has_plugs:
+            add_body(plotter, chamber, "mask")
+
     eye, near = views
     whole = chamber_panel(add, part, chamber, eye, finer=finer)
-    return [whole, *near_panels(add, target, part, near, finer)]
+    return [whole, *near_panels(add_plugged, target, part, near, finer)]
 
 
 def chamber_panel(
@@ -210,13 +219,22 @@ def chamber_dimensions(chamber: Surface, eye: np.ndarray) -> list[Dimension]:
 
 
 def _walls_end(chamber: Surface) -> float:
-    """Return the height [mm] at which walls end: at the ceiling, or on a part just below it."""
+    """Return the height [mm] at which walls end: at the ceiling, or on a part just below it.
+
+    A side wall ends on the part where all that it meets of it is just below the ceiling.
+    """
     faces, tag = np.asarray(chamber.regular_faces), np.asarray(chamber["tag"])
-    high, heights = float(chamber.bounds[5]), np.asarray(chamber.points)[:, 2]
-    if (heights[faces[tag == TAG_WALL]] > high - LEVEL).all(axis=1).any():
-        return high  # there is a ceiling beside the part
-    heights = heights[np.intersect1d(faces[tag == TAG_PART], faces[tag == TAG_WALL])]
-    return float(min(heights[heights > high - EDGE * MM], default=high))
+    high, points = float(chamber.bounds[5]), np.asarray(chamber.points, dtype=float)
+    heights, walls = points[:, 2], faces[tag == TAG_WALL]
+    aside = walls[(heights[walls] < high - LEVEL).any(axis=1)]
+    ways, number = np.unique(np.round(unit_normals(points[aside]), 3), axis=0, return_inverse=True)
+    at_part = np.isin(np.arange(len(points)), faces[tag == TAG_PART])
+    ends = [high]
+    for k in range(len(ways)):
+        corners = np.unique(aside[number.reshape(-1) == k])
+        lowest = float(heights[corners[at_part[corners]]].min(initial=high))
+        ends += [lowest] if lowest > high - EDGE * MM else []
+    return min(ends)
 
 
 def _upright(foot: np.ndarray, low: float, high: float, row: int) -> Dimension:

@@ -177,6 +177,8 @@ def render_part(job: dict[str, Any]) -> None:
     poses = []
     if job["chamber"] is not None:
         poses = _further_poses(job)
+        mask = job["chamber"].fixtures.get("mask")
+        job["has_plugs"] = mask is not None and mask.kind == "plugs"
         job = job | {"chamber": cavity_surface(job["chamber"], job["face"])}
     kinds = np.select([missed, marked], [MISSED, MARKED], PLAIN)
     part, shown = _coloured(job, kinds)
@@ -296,7 +298,7 @@ def _panels(
         return without_twin(near_panels(add, target, part, near))
     chamber = job["chamber"]
     eye, near = choose_views([(target, part)], [chamber])
-    whole, *of_target = part_panels(add, target, part, chamber, (eye, near))
+    whole, *of_target = part_panels(add, target, part, chamber, (eye, near), job["has_plugs"])
     if not poses:
         return [whole, *without_twin(of_target)]
     others = [

@@ -55,8 +55,8 @@ FIRST_ROW, ROWS = 4.0, 4.2
 CROSS = 4.0  # mm on paper, of the lines that cross in the middle of an opening
 MOST_CENTRES = 1  # heights of openings on each side of a section
 LETTER = 1.0  # mm on paper, width of a letter of a name of a holder
-# mm on paper, from the part to the dimension of the opening above it, and what that takes more where
-# its text stands above its line
+# mm on paper, from the part to the dimension of the opening above it, and what that takes more
+# where its text stands above its line
 OPENING, ABOVE_LINE = 3.0, 0.8
 ROOM = "#e8f1f7"
 

@@ -91,6 +91,19 @@ def test_the_height_ends_at_a_ceiling_beside_a_part_that_goes_out_just_below_it(
     assert "39.7 mm" not in texts
 
 
+def test_the_height_is_that_of_a_wall_on_which_the_part_lies(tmp_path: Path) -> None:
+    """An angle goes down through the ceiling; its arm lies on a wall 0.2 mm below that."""
+    leg = trimesh.creation.box((6.0, 20.0, 30.0))
+    leg.apply_translation((0.0, 0.0, 15.0))
+    arm = trimesh.creation.box((60.0, 20.0, 5.2))
+    arm.apply_translation((27.0, 0.0, 27.4))
+    angle = trimesh.boolean.union([leg, arm])
+    cavity = cavity_surface(chamber_of(tmp_path, angle, offset_mm=(27.0, 0.0)))
+    texts = [one.text for one in chamber_dimensions(cavity, np.array([0.5, -0.8, 0.3]))]
+    assert "39.8 mm" in texts
+    assert "40 mm" not in texts
+
+
 def test_a_part_is_drawn_only_where_there_can_be_such_a_file(tmp_path: Path) -> None:
     for name, said in (("part.jpg", r"\.png"), ("nowhere/part.png", "does not exist")):
         with pytest.raises(InputError, match=said):
