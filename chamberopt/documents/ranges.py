@@ -106,7 +106,9 @@ def range_answer(result: Result) -> Iterator[AnswerLine]:
         text = f"Not calibrated: {_groups(found)}. Over their ranges the {label.text} "
         if figure.is_resolved:
             between = _of(label, figure)
-            text += f"is {with_its_unit(label, between)}; {_narrowed(figure)}."
+            told = with_its_unit(label, between)
+            is_narrow = " to " not in between
+            text += f"is {told}." if is_narrow else f"is {told}; {_narrowed(figure)}."
         else:
             text += f"is as above: {_narrowed(figure)}."
         yield AnswerLine("ranges", text, False)

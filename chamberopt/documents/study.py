@@ -28,6 +28,7 @@ from chamberopt.documents.wording import (
     metric_label,
     objective_label,
     per_cent,
+    per_cent_closely,
     plain,
     with_interval,
     with_unit,
@@ -109,7 +110,7 @@ def aim_in_words(tables: Mapping[str, Any]) -> str:
 def exposed_target(result: Result) -> str:
     """Return a text with the area and reachable share of a target inside the chamber, else ""."""
     area = result.record.chamber.target_exposed_area_mm2
-    share = per_cent(result.record.field.reachable_share)
+    share = per_cent_closely(result.record.field.reachable_share)
     left = ", without what no ball touches" if result.design.part.target.reachable else ""
     return (
         f"{plain(area)} mm² in the chamber{left}; the shot can reach {share} of it" if area else ""

@@ -178,6 +178,11 @@ def per_cent(value: float) -> str:
     return f"{100.0 * value:.0f} %"
 
 
+def per_cent_closely(value: float) -> str:
+    """Return a share from 0 to 1 as text in per cent with one decimal, such as "1.4 %"."""
+    return f"{plain(round(100.0 * value, 1))} %"
+
+
 def keys_in_words(text: str) -> str:
     """Return a text with words in the place of keys of files, for readers who edit no file.
 

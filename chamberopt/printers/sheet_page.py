@@ -21,6 +21,7 @@ from chamberopt.chamber.checks.strips import strip_of_target
 from chamberopt.chamber.checks.usual import usual_for_target
 from chamberopt.chamber.fixture import plugs_of
 from chamberopt.chamber.layout.grip import outside_clamp
+from chamberopt.chamber.layout.screws import holes_for_screws
 from chamberopt.common.errors import InputError
 from chamberopt.common.files import claim_file, private_folder, write_bytes
 from chamberopt.common.number_text import held_together
@@ -317,6 +318,7 @@ def write_sheet(
             largest_flat_face(part),
             part_is_ceiling(chamber),
             outside_clamp(chamber, design.effects.part_turn is not None).text,
+            "" if design.effects.part_turn else holes_for_screws(design, chamber),
             None if push is None else (float(push[0]), float(push[1]), float(push[2])),
             float(tetrahedron_volumes(part.vertices, part.triangles).sum()),
             places,

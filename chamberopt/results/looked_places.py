@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ PATCHES = 8.0
 POINTS = 8.0  # on the side of a cube, of which a patch is made
 LEAST_WINDOWS = 3.0
 SHORT = 0.25  # side of the target over its longest, below which it has no ends along that side
+OFF = 1e-5  # of the part's size, by which a ray begins off the surface
 ACROSS = 0.7  # share of a normal along an axis from which on the axis is not along the surface
 
 
@@ -35,12 +37,14 @@ class LookedPlace(NamedTuple):
             which the place is nearest to an end.
         density: of the dents expected in it after the treatment time, such that its coverage is
             1 - exp(-density).
+        to_part: from it along its normal to another place of the part [m]; inf if there is none.
     """
 
     at: np.ndarray
     normal: np.ndarray
     along: tuple[int, float]
     density: float
+    to_part: float = math.inf
 
     def coverage(self, times: float) -> float:
         """Return the expected coverage after a multiple of the treatment time."""
@@ -94,7 +98,24 @@ def looked_places(arrays: ResultArrays, gauge: float) -> list[LookedPlace]:
         share = np.where(is_short, 0.0, (2.0 * at - low - high) / np.maximum(high - low, 1e-12))
         axis = int(np.where(np.abs(normal) > ACROSS, 0.0, np.abs(share)).argmax())
         density = -float(np.log1p(-min(mean[one], 1.0 - 1e-9)))
-        found.append(LookedPlace(at, normal, (axis, float(share[axis])), density))
+        before = _to_part(part.vertices[part.triangles], at, normal)
+        found.append(LookedPlace(at, normal, (axis, float(share[axis])), density, before))
         if len(found) == MOST_PLACES:
             break
     return found
+
+
+def _to_part(corners: np.ndarray, at: np.ndarray, normal: np.ndarray) -> float:
+    """Return how far the part is before a place on it, along the normal [m]; inf if it is not.
+
+    Args:
+        corners: of the part's triangles [m], (m, 3, 3).
+        at, normal: the place [m] and its normal, (3,).
+    """
+    from sim_core import ray_lengths
+
+    # A ray that leaves the part's inside out crosses its triangles from the other side.
+    inside_out = corners[:, ::-1]
+    reach = float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
+    start = at + OFF * reach * normal
+    return float(ray_lengths(inside_out, start[None], normal[None], reach)[0])

@@ -275,8 +275,8 @@ def _plugged(
     if holes:
         named = "not to be peened, or " if fits else ""
         words.append(
-            f"{_of_sizes(holes)}, {named}which the wall crosses: from the rims up to the wall, so "
-            "that no ball leaves there"
+            f"{_of_sizes(holes)}, {named}which the wall crosses: flush with the rims, so that no "
+            "ball leaves there"
         )
     if opened:
         words.append(

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 
 import numpy as np
 
 from chamberopt.chamber.checks.openings import find_openings, mounting
 from chamberopt.chamber.checks.place_names import CEILING, surface_names
-from chamberopt.chamber.layout.arbor import find_bores
 from chamberopt.chamber.layout.end import DEEP
 from chamberopt.chamber.layout.floor import Floor
 from chamberopt.chamber.layout.grip import Clamp, free_outside, outside_clamp, sides_out
+from chamberopt.chamber.layout.screws import holes_for_screws
 from chamberopt.chamber.layout.target import apart, area_in_mm2, named_or_all
 from chamberopt.chamber.matters import MatterKind
-from chamberopt.chamber.part import of_target, turning_axis
+from chamberopt.chamber.part import turning_axis
 from chamberopt.chamber.propose.proposal import Proposal, checked, with_table
 from chamberopt.chamber.propose.proposed_mask import rows_of
 from chamberopt.chamber.shop import Shop
-from chamberopt.common.number_text import plain
 from chamberopt.design.fixture import WIDEST_GAP, tight_gap_mm
 from chamberopt.geometry.outline import frame_along
 
@@ -29,7 +27,6 @@ MOST_JAWS, JAW_SHARE = 2, 0.05  # surfaces named to clamp a part by; least area 
 # Of a part that turns: ball diameters between it and the walls, so that no ball is jammed there,
 # and m between its axis and the middle of an opening.
 FREE, OFF_AXIS = 1.0, 2e-4
-ALL_OUTSIDE = 0.95  # share of a hole's wall outside of the walls, for screws
 
 
 def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal:
@@ -39,7 +36,8 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     tables = with_table(made.tables, "sonotrode", "holder", keys)
     by = f" by {clamp.text}" if (clamp := _clamp(made)).text else ""
     if not _turns(made):
-        by += _by_screws(made)
+        holes = holes_for_screws(made.design, made.chamber)
+        by += f", or by screws through its {holes} there" if holes else ""
     holds = "turned" if _turns(made) else "clamped"
     sides = ", ".join(sides_out(made.chamber))
     text = (
@@ -55,19 +53,6 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
         )
     reasons = {**made.reasons, "holder.kind": text}
     return checked(tables, reasons, floor, made.known, made.mesh, shop)
-
-
-def _by_screws(made: Proposal) -> str:
-    """Return in words through which holes outside of the chamber screws may hold a part; or ""."""
-    design, outside, area = made.design, free_outside(made.chamber), made.chamber.part.area
-    bores = find_bores(made.mesh, of_target(made.mesh, design.part.target), for_arbor=False)
-    sizes: Counter[str] = Counter()
-    for bore in bores:
-        rows = rows_of(design, {"faces": [bore.wall]})
-        if outside[rows].sum() > ALL_OUTSIDE * area[rows].sum():
-            sizes[plain(2e3 * bore.radius, 3)] += 1
-    found = [f"{count} holes of {size} mm" for size, count in sizes.items() if count > 1]
-    return f", or by screws through its {' or '.join(found)} there" if found else ""
 
 
 def _turns(made: Proposal) -> bool:

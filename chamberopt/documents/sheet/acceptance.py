@@ -15,8 +15,13 @@ from chamberopt.common.number_text import rounded
 from chamberopt.coverage.metrics import FULL_COVERAGE
 from chamberopt.design.almen_strip import STRIPS
 from chamberopt.documents.sheet.rows import AsBuilt, Row
-from chamberopt.documents.wanted import intensity_text, multiple_in_words, strip_for
-from chamberopt.documents.wording import per_cent, plain
+from chamberopt.documents.wanted import (
+    intensity_text,
+    may_be_too_short,
+    multiple_in_words,
+    strip_for,
+)
+from chamberopt.documents.wording import per_cent, per_cent_closely, plain
 from chamberopt.peening.held_strip import SCREW_MM
 
 if TYPE_CHECKING:
@@ -34,6 +39,7 @@ LENS = "a magnifier of 10 to 30 times (SAE J2277)"
 ASIDE = 0.35  # least share of a normal along an axis for a surface to be told to look that way
 NEAR_END = 1.0 / 3.0  # share of half the target's length from which on a place is near its end
 LEAST_SEEN = 0.2  # share of dents below which it is hard to see how large it is
+MOST_TIMES = 2.0  # peening times in all after which a part counts as over-peened, a rule of thumb
 LEAST_MISSED = 5e-3  # share of the target out of reach that is told
 # SAE AMS 2580A allows it where no strip can be (as quoted in the forum of shotpeener.com).
 COUPON = (
@@ -68,14 +74,31 @@ def acceptance_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         yield "places to look at", f"all of the target, by {LENS}: too few dents tell places apart"
     seen = f"each of places 1 to {len(places)}" if len(places) > 1 else "the target"
     missed = 1.0 - result.record.field.reachable_share
-    but = f", but the {per_cent(missed)} that no ball can touch (see Warnings)"
+    bare = per_cent_closely(missed)
+    but = f", but the {bare} that no ball can touch, brown under Coverage by place"
     yield (
         "ACCEPT or REJECT",
         f"ACCEPT coverage if dents lie on {per_cent(FULL_COVERAGE)} or more of {seen}, and nothing "
         f"else of the target is bare{but if missed > LEAST_MISSED else ''}. If not, peen the part "
-        "for the same time once more and look again; REJECT it if it is still less.",
+        "for the same time once more and look again; REJECT it if it is still less. "
+        f"{_over_peened(result)}",
     )
     yield "intensity", _intensity(result, built)
+
+
+def _over_peened(result: Result) -> str:
+    """Return in words for how long a part is peened at most."""
+    planned, time = result.design.process.treatment_time, result.metrics.get(TIME)
+    if may_be_too_short(result):
+        most = "twice the peening time"
+    else:
+        most = f"{plain(MOST_TIMES * planned)} s"
+        if time is not None and time.has_number and time.value > 0.0:
+            most += f", {plain(MOST_TIMES * planned / time.value, 2)} × the time to 98 %"
+    return (
+        f"No part is peened for more than {most}, in all: REJECT it as over-peened, unless its "
+        "drawing allows more."
+    )
 
 
 def _kind(result: Result, built: AsBuilt) -> str:
@@ -125,12 +148,13 @@ def _slowest(result: Result, built: AsBuilt) -> str:
             f"{plain(1e3 * OF_FILLET * min(narrow), 2)} mm"
         )
     elif place.normal[2] > ASIDE and not turns:
-        what = "it looks up: simulate the part turned over after half of the time ([[steps]])"
+        what = "it looks up: simulate the part turned over after half of the time, in two steps"
     elif abs(place.normal[2]) <= ASIDE and not turns:
-        what = (
-            "it looks aside: simulate more room between it and the wall, or a second pose in which "
-            "it looks down ([[steps]])"
-        )
+        narrow = "it looks aside: simulate more room between it and the wall"
+        if math.isfinite(place.to_part):
+            apart = plain(round(1e3 * place.to_part, 1))
+            narrow = f"the part itself is before it, {apart} mm away: simulate smaller balls"
+        what = f"{narrow}, or a second pose in which it looks down, in two steps"
     else:
         what = "simulate more room beside it and a larger distance from the sonotrode"
     return (

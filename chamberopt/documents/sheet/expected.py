@@ -26,7 +26,7 @@ from chamberopt.documents.sheet.rows import (
     weighed_g,
     with_limits,
 )
-from chamberopt.documents.wanted import may_be_too_short, strip_for, wanted_rows
+from chamberopt.documents.wanted import enough_time, may_be_too_short, strip_for, wanted_rows
 from chamberopt.documents.wording import metric_label, plain
 from chamberopt.results.load import load_start
 
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from chamberopt.results.load import Result
 
 TIME = "time_to_98_s"
+LONG = 1.5  # times a time that is enough, from which on a time that nobody asked for is told
 # The aim of searches, which nobody on the shop floor acts on.
 UNIFORM = "uniform_coverage"
 NO_INTENSITY = (
@@ -46,7 +47,6 @@ EXPECTED = (
     "mean_coverage",
     "p05_coverage",
     "time_to_98_s",
-    "exposure",
     "almen_intensity",
     "almen_intensity_p05",
     "almen_intensity_p95",
@@ -55,10 +55,7 @@ EXPECTED = (
     "compression_depth_um",
 )
 # What a shop calls figures that only the program has names for.
-SHOP_NAMES = {
-    "exposure": "peening time over the time to 98 % coverage, mean",
-    "strength_um": "strength of the dents, to which mmA is proportional",
-}
+SHOP_NAMES = {"strength_um": "strength of the dents, to which mmA is proportional"}
 # Of the expected saturation time, after which strips are peened: a curve has at least four points,
 # one of them at twice that time or later (SAE J443).
 STRIP_TIMES = (0.25, 0.5, 1.0, 2.0)
@@ -75,6 +72,8 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
     time = f"{plain(result.design.process.treatment_time)} s{of_all}"
     time += " to start with, NOT YET SET: see 3 peen" if may_be_too_short(result) else ""
     yield "peening time", with_limits(result, "process.treatment_time_s", time)
+    if shorter := _shorter(result):
+        yield "shorter", shorter
     yield from wanted_rows(result)
     calibration = result.design.calibration
     shown = expected_figures(result)
@@ -98,6 +97,24 @@ def expected_rows(result: Result, usual: WantedIntensity | None) -> Iterator[Row
             if rest:
                 yield "", f"{over.strip()}{rest}"
     yield "", f"± 95 % intervals. {limits_of_intervals(result, has_groups=True)}"
+
+
+def _shorter(result: Result) -> str:
+    """Return in words which time is enough, where no coverage is asked for and far less would do.
+
+    The time of a design that no pilot told is a start.
+    """
+    process, enough = result.design.process, enough_time(result.design, result.metrics)
+    if process.coverage_percent is not None or result.design.steps or enough is None:
+        return ""
+    if process.treatment_time < LONG * enough:
+        return ""
+    slow = time_at_slow_end(result)
+    slow = f", or {slow} at the slow end of what is not calibrated" if slow else ""
+    return (
+        f"{plain(enough)} s are enough for 98 %{slow}. Peen longer only if the drawing asks for "
+        "more, such as 200 %, twice as long"
+    )
 
 
 def _figure_text(row: Figure, result: Result) -> str:

@@ -33,6 +33,12 @@ EITHER = (
 THROUGH = "; it goes on through the wall, fixed there, or in bearings and sealed"
 FOLLOWS = "follows from the distance, as the walls end on the part"
 FILLED = "balls go in and out there"
+# By heart: no text on plugs was read.
+PLUGS = (
+    "usual, by heart: of polyamide, turned 0.1 mm larger than the hole, pressed in, which holds "
+    "them, and pressed out from the other rim; count them after each part, new ones where they are "
+    "worn. Simulated as hard as the walls"
+)
 MOUNTED: dict[Mounting, str] = {
     "part goes in": "the part goes in from outside",
     "wall goes over": "the wall goes over it from outside",
@@ -52,6 +58,8 @@ def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
             play = f"{plain(holder.clearance_mm)} mm of clearance all round, in the sizes below"
         how = "turned" if turns else "clamped"
         by = f"; {how} by {built.clamp.replace(' -', ' −')}" if built.clamp else ""
+        if by and built.screws:
+            by += f", or by screws through its {built.screws} there"
         yield "holder", f"the part itself, out through the wall, {play}{by}"
     mask = result.design.mask
     if holder is None and not result.record.chamber.pieces_in_air:
@@ -80,7 +88,7 @@ def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         size = size_in_words(one.kind, one.size_mm)
         if one.kind == "plugs":
             sizes = f"{plugs_in_words(built.plugs)}, " if built.plugs else ""
-            size = f"{sizes}flush with their rims"
+            size = f"{sizes}flush with both rims"
         text = f"{one.kind} {size or 'up to the wall'}"
         if one.length_mm:
             text += f", {plain(one.length_mm)} mm long"
@@ -96,6 +104,8 @@ def fixture_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
         chosen = faces[name]
         where = f" ({', '.join(chosen.surface)})" if chosen and chosen.surface != ("all",) else ""
         yield name, f"{text}, on {plain(one.covered_mm2, 3)} mm² of the part{where}"
+        if one.kind == "plugs":
+            yield "plugs", PLUGS
 
 
 def _flanges(holder: Holder) -> str:

@@ -49,6 +49,7 @@ class AsBuilt(NamedTuple):
     flat: FlatFace | None = None  # the part's largest, by which it is seen how it is turned
     is_ceiling: bool = False  # the part closes the room, which has no other ceiling
     clamp: str = ""  # what clamps the part where it stands out, in words
+    screws: str = ""  # holes there that take screws, in words, such as "4 holes of 9 mm"
     push: tuple[float, float, float] | None = None  # mean force of the shot on the part [N]
     volume: float = 0.0  # of the part [m³]
     places: Sequence[LookedPlace] = ()  # of the target to look at, the least covered first

@@ -39,7 +39,7 @@ from chamberopt.documents.sheet.rows import (
 )
 from chamberopt.documents.study import exposed_target
 from chamberopt.documents.wanted import may_be_too_short, multiple_in_words
-from chamberopt.documents.wording import plain
+from chamberopt.documents.wording import per_cent, plain
 from chamberopt.documents.zones import turned
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ FRAME = (
 LEAST_SLIT_MM = 0.2  # of both sides of a face, by heart: it vibrates and must touch nothing
 SQUARE = 0.9998  # cosine between a face's normal and an axis from which on it looks along the axis
 SAME_MM = 0.02  # lengths that differ by less count as equal
+MASS_SHARE = 0.05  # of the shot's mass, more or less, where the design states no tolerance of it
 MOST_KEYS = 8  # numbers of the chamber
 MOSTLY = 0.7  # share of a force along an axis from which on it is told to push that way
 GRAVITY = 9.81  # m/s²
@@ -306,7 +307,15 @@ def shot_rows(result: Result) -> Iterator[Row]:
         sizes.append(("balls", f"{text}, {plain(mass, 3)} g" if several else text))
     yield from first_rows(sizes, "sizes")
     asked = with_limits(result, "shot.mass_g", f"asked: {plain(shot.mass_g)} g")
-    yield "mass of these balls", f"{plain(weighed_g(shot), 3)} g ({asked})"
+    weighed = weighed_g(shot)
+    yield "mass of these balls", f"{plain(weighed, 3)} g ({asked})"
+    if "shot.mass_g" not in tolerance_box(result.design):
+        low, high = (plain((1.0 + sign * MASS_SHARE) * weighed, 3) for sign in (-1.0, 1.0))
+        yield (
+            "keep it at",
+            f"{low} to {high} g, as impacts are as many more or fewer (± {per_cent(MASS_SHARE)}, a "
+            "rule of thumb)",
+        )
     for name, one in result.design.in_steps.items():
         if one.shot != shot:
             counts = (f"{count:,} of Ø {plain(1e3 * size)} mm" for size, count in one.shot.sizes)
