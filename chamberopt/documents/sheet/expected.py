@@ -107,7 +107,10 @@ def _shorter(result: Result) -> str:
     process, enough = result.design.process, enough_time(result.design, result.metrics)
     if process.coverage_percent is not None or result.design.steps or enough is None:
         return ""
-    if process.treatment_time < LONG * enough:
+    ranges = result.record.ranges
+    known = None if ranges is None else ranges.figures.get(TIME)
+    late = known.high.high if known is not None and known.is_resolved else 0.0
+    if process.treatment_time < LONG * max(enough, late):
         return ""
     slow = time_at_slow_end(result)
     slow = f", or {slow} at the slow end of what is not calibrated" if slow else ""

@@ -301,7 +301,7 @@ def _beyond(one: Opening, openings: Sequence[Opening], held: str, mounted: str) 
     if one.beyond < EDGE:
         return f"the part fills it{mounted}"
     farthest = max(other.beyond for other in openings)
-    is_held = one.beyond >= min(CLAMPED, farthest) and walls_end_at([one]) is None
+    is_held = one.beyond >= min(CLAMPED, farthest) and walls_end_at(openings) is None
     clamp = f": {held}" if is_held else ""
     wider = ""
     if one.wider is not None:

@@ -13,11 +13,13 @@ from chamberopt.chamber.checks.openings import walls_end_at
 from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.layout.pose import axis_down
 from chamberopt.chamber.layout.shot_material import iron_of_walls
+from chamberopt.chamber.matters import MatterKind
 from chamberopt.common.key_words import in_words
 from chamberopt.design.fixture import joint_in_words, slit_in_words, slit_mm
 from chamberopt.design.materials import alloys, balls, find
 from chamberopt.design.tolerances import tolerance_box
 from chamberopt.documents.answer import answer_lines
+from chamberopt.documents.report import open_matters
 from chamberopt.documents.sheet.openings import (
     FOLLOWS,
     clearance_of,
@@ -219,7 +221,9 @@ def chamber_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     yield from first_rows(rows, "numbers", MOST_KEYS)
     if built.push is not None:
         yield "hold it against", _push(result, built.push, built.volume)
-    if iron := iron_of_walls(result.design.materials.part.alloy or "", wall or ""):
+    iron = iron_of_walls(result.design.materials.part.alloy or "", wall or "")
+    is_told = any(one.kind is MatterKind.IRON_FROM_WALLS for one in open_matters(result))
+    if iron and not is_told:  # among what is to be settled
         yield "iron", for_the_shop(iron)
     yield "opened at", lid_in_words(built)
     for what, several in counted.items():

@@ -57,7 +57,7 @@ MOST_CENTRES = 1  # heights of openings on each side of a section
 LETTER = 1.0  # mm on paper, width of a letter of a name of a holder
 # mm on paper, from the part to the dimension of the opening above it, and what that takes more
 # where its text stands above its line
-OPENING, ABOVE_LINE = 3.0, 0.8
+OPENING, ABOVE_LINE = 3.0, 1.2
 ROOM = "#e8f1f7"
 
 

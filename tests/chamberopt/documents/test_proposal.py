@@ -1,5 +1,6 @@
 """The end of `new` on a terminal."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -17,6 +18,7 @@ from chamberopt.documents.proposal import (
     WIDTH,
     _in_short,
     _intensity,
+    _strips,
     clauses,
     proposal_in_words,
     proposal_lines,
@@ -232,6 +234,24 @@ def test_an_intensity_stands_beside_its_range_and_only_strips_decide(
     assert _intensity(replace(made, expected=known, usual=usual)) == f"{about}, {words}"
     assert _intensity(replace(made, expected=None, usual=usual)) == ""
     assert _intensity(replace(made, expected=rough, usual=None)).endswith(" of 2.5.")
+
+
+def test_strips_are_told_with_the_command_that_peens_them(made: Proposal) -> None:
+    """Where they are held, by their screws and their block, is that of the process sheet."""
+    wide = {"shape": "cylinder", "diameter_mm": 90.0, "height_mm": 60.0}
+    wide["sonotrode_distance_mm"] = 15.0
+    for room, told in (
+        (wide, r"A strips in the lid in place of the part, \S+ mm .* strip --distance-mm \S+$"),
+        (
+            wide | {"diameter_mm": 60.0},
+            r"pieces of \S+ × 19 mm cut from A strips, in .* no mmA until",
+        ),
+        (wide | {"diameter_mm": 20.0}, "accept a part by its coverage.*by a coupon of its metal"),
+    ):
+        design = made.design.changed({"chamber": room})
+        assert re.search(told, _strips(replace(made, design=design)))
+    ordered = made.design.changed({"chamber": wide, "process.intensity_mmA": (0.05, 0.08)})
+    assert "strip --type N --distance-mm" in _strips(replace(made, design=ordered))
 
 
 def test_several_numbered_faces_are_one_list() -> None:

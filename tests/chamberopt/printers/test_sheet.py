@@ -520,6 +520,15 @@ def test_the_holder_of_a_strip_is_described_on_a_page_with_room(folder: Path) ->
     assert "no opening; those that the part leaves in the walls are closed flush" in rows["block"]
 
 
+def test_what_is_to_be_settled_is_told_once(folder: Path) -> None:
+    """Iron of the walls is a row of the chamber only where it is no matter to settle."""
+    result = load_result(folder)
+    metals = {"materials.part": "7075-T6", "materials.wall": "100Cr6"}
+    for settle, is_row in (((), True), (("IRON FROM THE WALLS: balls carry it",), False)):
+        design = result.design.changed({**metals, "to_settle": settle})
+        assert ("iron" in rows_of(replace(result, design=design))["Chamber"]) == is_row
+
+
 def test_a_part_has_a_longest_time_and_the_shot_a_range_of_its_mass(folder: Path) -> None:
     """Twice the peening time; a time that nobody asked for, and is far too long, is told."""
     result = load_result(folder)
