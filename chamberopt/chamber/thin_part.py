@@ -192,9 +192,10 @@ def _note(design: Design, name: str, thin: ThinTarget) -> str:
     if not math.isfinite(thin.median):
         median = "half of it thick, or no plate"
     return (
-        f"{name} is thin (thinnest {1e3 * thin.thinnest:.2g} mm, {median}): flexure lowers the "
-        f"restitution by more than {LOSS:.0%} on {thin.lowered:.0%} of it, at the median to "
-        f"{thin.restitution:.2f} times at {design.sonotrode.rms_peak_speed:.2g} m/s (Zener 1941); "
+        f"{name} gives way under the balls (thinnest {1e3 * thin.thinnest:.2g} mm, {median}): "
+        f"flexure lowers the restitution to {thin.restitution:.2f} times at the median, at "
+        f"{design.sonotrode.rms_peak_speed:.2g} m/s, and by more than {LOSS:.0%} on "
+        f"{thin.lowered:.0%} of it (Zener 1941); "
         f"{thin.near_edge:.0%} of that is so near to an edge that the theory is rough there; "
         "dents are narrower by an estimate (docs/explanation/effects.md); "
         "effects.flexure = false leaves it out"

@@ -60,6 +60,9 @@ MOST_LOOKED_AT = 20  # surfaces, the largest
 # Share of the target's area from which on what is met of a surface is named, though most of it lies
 # outside of the chamber.
 PARTLY_MET = 0.05
+# Share of the target's area below which what the shot meets beside it is not told, unless the file
+# has a name for it.
+TRIFLE = 0.01
 # Outer edges that turn by more [degrees] are sharp; the length of them that is told [m].
 SHARP, LEAST_EDGES = 45.0, 5e-3
 EDGES = (
@@ -484,7 +487,8 @@ def met_beside(proposal: Proposal, target: np.ndarray) -> Iterator[LeftOut]:
     text = ", ".join(names)
     if (rest := float(bare[~named].sum())) > LEAST * target_area:
         text += f"{' and ' if text else ''}{area_in_mm2(rest)} {'more' if text else 'beside it'}"
-    if not text:
+    is_trifle = float(bare.sum()) < TRIFLE * target_area  # such as the ends of a wire
+    if not text or (is_trifle and not any("surface" in one.keys for one, *_ in met)):
         return
     is_bare = proposal.design.mask is None
     kind = MatterKind.NOT_MASKED if is_bare else MatterKind.STILL_NOT_MASKED

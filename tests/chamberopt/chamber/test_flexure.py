@@ -55,7 +55,7 @@ def test_a_blade_is_thin_by_itself(blade: Design, chamber: Chamber) -> None:
         chamber.part.vertices[chamber.part.triangles][:, :, 2].min(axis=1) > 0.0585
     ].any()
     (note,) = thin_notes(chamber)
-    assert note.startswith("the target is thin (thinnest 0.")
+    assert note.startswith("the target gives way under the balls (thinnest 0.")
     facts = flexure_facts(blade, chamber)["flexure"]
     assert facts["lowers_restitution_on_share"] > 0.9  # type: ignore[operator]
     assert 0.5 < facts["restitution_times"] < 0.98  # type: ignore[operator]

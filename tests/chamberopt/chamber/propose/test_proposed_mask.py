@@ -218,6 +218,10 @@ def test_the_face_that_goes_on_beside_a_fillet_is_met(monkeypatch: pytest.Monkey
     told = sum(float(one) for one in re.findall(r"([0-9]+) mm²", met.text))
     assert told == pytest.approx(1e6 * area[~bent].sum(), abs=2.0)
     assert " mm² more; what has to keep" in met.text  # one of four faces is not named
+    for share, is_told in ((0.009, False), (0.011, True)):  # of the target's area, beside it
+        small = np.where(bent, area, share * area * area[bent].sum() / area[~bent].sum())
+        made.chamber.part.area = made.chamber.exposed_area = small
+        assert bool([*met_beside(made, bent)]) == is_told  # type: ignore[arg-type]
 
 
 def test_what_faces_away_is_offered_for_leaving_out(
