@@ -44,6 +44,8 @@ WIDER_MM, RIM_MM = 0.5, 1.0
 # What stands on a part or goes through it carries it near its centre of mass: largest distance of
 # its axis from there over the part's size that way.
 CENTRED = 0.25
+# Widest gap between vertices round a way through a part, seen along it [rad].
+AROUND = math.radians(30.0)
 UPRIGHT, LEVEL = 0.999, 0.02  # cosines with the vertical of an axis that is upright, and level
 
 
@@ -185,6 +187,23 @@ def carries(mesh: PartMesh, point: np.ndarray, axis: np.ndarray) -> bool:
     offset = offset - (offset @ axis) * axis
     away = float(np.linalg.norm(offset))
     return away * away <= CENTRED * float(np.ptp(mesh.vertices @ offset))
+
+
+def way_through(mesh: PartMesh) -> tuple[str, float] | None:
+    """Return the widest free way through a part that goes all round it, as a spring does.
+
+    It is the axis of the part's file along which it leads, past the centre of mass, and how wide a
+    rod may be there [m]; None if there is none.
+    """
+    middle, found = centre_of_mass(mesh.vertices, mesh.triangles), []
+    for axis in range(3):
+        plan = np.delete(mesh.vertices - middle, axis, axis=1)
+        angle = np.sort(np.arctan2(*plan.T))
+        if np.diff(angle, append=angle[0] + 2.0 * np.pi).max() < AROUND:
+            free = float(distances_in_plan(plan[mesh.triangles], np.zeros(2)).min())
+            found.append((2.0 * free, "xyz"[axis]))
+    width, along = max(found, default=(0.0, ""))
+    return (along, width) if width > THINNEST else None
 
 
 def _depth_of_seat(bore: Bore, mesh: PartMesh, radius: float, even: float) -> float:

@@ -17,7 +17,7 @@ from chamberopt.chamber.checks.check import touched
 from chamberopt.chamber.checks.gaps import resting_on_holder
 from chamberopt.chamber.checks.place_names import PART, one_of
 from chamberopt.chamber.checks.warning import WarningKind
-from chamberopt.chamber.layout.arbor import Bore
+from chamberopt.chamber.layout.arbor import Bore, way_through
 from chamberopt.chamber.layout.end import HeldEnd
 from chamberopt.chamber.layout.floor import Floor
 from chamberopt.chamber.layout.grip import thin_grip
@@ -110,8 +110,20 @@ def held(
         why = why or _not_held(one, harm, len(choices))
     if second is not None:
         return _with_balls_on_holder(second)
-    text = f"sonotrode to ceiling; {MatterKind.NOTHING_HOLDS}: {why}"
+    text = f"sonotrode to ceiling; {MatterKind.NOTHING_HOLDS}: {why}{_by_a_rod(free)}"
     return replace(free, reasons={**free.reasons, "chamber.height_mm": text})
+
+
+def _by_a_rod(free: Proposal) -> str:
+    """Return in words how a part is hung that no holder of a design holds; "" if it cannot be."""
+    if (way := way_through(free.mesh)) is None:
+        return ""
+    along, width = way
+    return (
+        f". It goes all round a free way of {1e3 * width:.2g} mm along its {along}: hang it there "
+        "on a thin rod through the chamber, which is not simulated, and shift it on the rod after "
+        "half of the time, so that the shot gets to where they touched (no source read)"
+    )
 
 
 def _with_balls_on_holder(made: Proposal) -> Proposal:

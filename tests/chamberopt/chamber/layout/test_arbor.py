@@ -2,14 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from manifold3d import Manifold
+from manifold3d import Manifold, OpType
 
-from chamberopt.chamber.layout.arbor import arbor_through, find_bores
+from chamberopt.chamber.layout.arbor import arbor_through, find_bores, way_through
 from chamberopt.chamber.layout.holder import holder_choices
 from chamberopt.chamber.layout.target import Surface
 from chamberopt.chamber.propose.first_design import propose
@@ -194,3 +195,33 @@ def test_a_disc_on_whose_web_balls_would_lie_turns_on_an_arbor(tmp_path: Path) -
     made = propose(part, Wanted("m"), lambda _: [])
     turns_on_an_arbor(made)
     assert made.sonotrode_count == 2  # lying it takes four
+
+
+def coil(mean: float, wire: float, pitch: float, turns: int) -> Manifold:
+    """A compression spring along z, of pieces of 10 degrees, which are turned and raised."""
+    angles = np.arange(36 * turns) * 10.0
+    ball = Manifold.sphere(wire / 2, 16).translate([mean / 2, 0, 0])
+    balls = [ball.rotate([0, 0, one]).translate([0, 0, pitch * one / 360]) for one in angles]
+    pieces = [Manifold.batch_hull(pair) for pair in pairwise(balls)]
+    return Manifold.batch_boolean(pieces, OpType.Add)
+
+
+@pytest.mark.parametrize(
+    ("body", "way"),
+    [
+        (ring(20.0, 12.0, 5.0), ("z", 24.0)),
+        (coil(26.0, 4.0, 6.0, 3), ("z", 22.0)),
+        (ring(20.0, 12.0, 5.0) - Manifold.cube([30, 14, 20], True).translate([15, 0, 0]), None),
+        (Manifold.cube([10, 10, 10]), None),
+        (ring(20.0, 1.5, 5.0), None),  # too thin for a rod
+    ],
+)
+def test_a_part_that_goes_round_a_free_way_is_hung_on_a_rod(
+    body: Manifold, way: tuple[str, float] | None
+) -> None:
+    """The way of a coil is as wide as its mean diameter less its wire."""
+    found = way_through(part_of(body)[0])
+    assert (found is None) == (way is None)
+    if found and way:
+        assert found[0] == way[0]
+        assert 1e3 * found[1] == pytest.approx(way[1], abs=0.6)
