@@ -8,7 +8,7 @@
                sonotrode
 
 The strip is flush with its holder, and both are of the same steel. It lies along x, or along y
-where it fits only so.
+where it fits only so. A real one lies on its block, and screws hold it (held_strip.py).
 """
 
 from __future__ import annotations

@@ -150,11 +150,11 @@ def _slowest(result: Result, built: AsBuilt) -> str:
     elif place.normal[2] > ASIDE and not turns:
         what = "it looks up: simulate the part turned over after half of the time, in two steps"
     elif abs(place.normal[2]) <= ASIDE and not turns:
-        room = "it looks aside: simulate more room between it and the wall"
+        remedy = "it looks aside: simulate more room between it and the wall"
         if math.isfinite(place.to_part):
             apart = plain(round(1e3 * place.to_part, 1))
-            room = f"the part itself is before it, {apart} mm away: simulate smaller balls"
-        what = f"{room}, or a second pose in which it looks down, in two steps"
+            remedy = f"the part itself is before it, {apart} mm away: simulate smaller balls"
+        what = f"{remedy}, or a second pose in which it looks down, in two steps"
     else:
         what = "simulate more room beside it and a larger distance from the sonotrode"
     return (

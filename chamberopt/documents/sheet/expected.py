@@ -203,9 +203,7 @@ def _checks(result: Result, held: HeldStrip | None) -> Iterator[Row]:
         rough = PredictedIntensity.of(result.metrics, calibration)
         kind, known = strip_for(design, result.metrics), "not known before: calibrates to mmA"
         if rough is not None:
-            known = (
-                f"{rough.on_strips(kind)}{rough.factor_in_words}, at the target: not at the strip"
-            )
+            known = f"{rough.on_strips(kind)}{rough.factor_in_words}: the target's, not the strip's"
         calibrates = ", to calibrate by" if kind == "A" else ""  # others do not tell mmA closely
         strips = f"{_strips_in_words(kind, held)} {_strip_times(result)}{calibrates}"
         yield strips if held is None else _in_the_lid(strips, held), known

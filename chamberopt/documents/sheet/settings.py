@@ -234,7 +234,7 @@ def chamber_rows(result: Result, built: AsBuilt) -> Iterator[Row]:
     holder = result.design.holder
     in_bore = holder is not None and holder.clearance_mm > 0.0
     places = "round the part as above, of all other joints" if in_bore else "of joints and openings"
-    slit = f"round the sonotrode {slit_in_words(ball)}"
+    slit = f"round the sonotrode, which may touch nothing, {slit_in_words(ball)}"
     yield "gaps", f"{places} {joint_in_words(ball)}, or sealed; {slit}"
     if volume := result.record.chamber.volume_mm3:
         yield "free volume", f"{plain(1e-3 * volume)} cm³"

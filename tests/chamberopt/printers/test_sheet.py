@@ -212,9 +212,7 @@ def test_the_strips_that_close_a_lid_have_sizes(folder: Path) -> None:
 
 def openings_of(result: Result, *openings: Opening) -> list[tuple[str, str]]:
     """The rows on openings."""
-    tables = setting_tables(result, AsBuilt((50.0,), openings))
-    rows = next(one for one in tables if one.caption == "Chamber").rows
-    return [(row[0], row[1]) for row in rows if row[0] == "opening"]
+    return openings_of_rows(setting_tables(result, AsBuilt((50.0,), openings)))
 
 
 def test_what_a_shop_needs_of_pose_target_strip_and_flanges(folder: Path) -> None:
@@ -360,7 +358,7 @@ def test_what_to_measure_first_without_a_calibration(folder: Path) -> None:
     checks = {what.split()[0]: expected for what, expected, _ in rows}
     assert checks["amplitude"] == "50 µm peak to valley"
     assert checks["ball"].startswith("sonotrode 0.7")
-    assert "mmA, within a factor of 2.5, at the target" in checks["A"]  # no strips: only roughly
+    assert "mmA, within a factor of 2.5: the target's" in checks["A"]  # no strips: only roughly
     few = load_result(folder)
     few.metrics["strength_um"] = Estimate(5.0, 0.1)  # 0.0675 mmA, too little for strips of type A
     told = next(row for row in first_checks(few).rows if "strips" in row[0])
@@ -395,7 +393,7 @@ def test_strips_are_set_at_the_height_of_the_target(folder: Path) -> None:
         assert ("strips after" in row) == (held.size is not None)  # no times without a strip
         assert ("pieces of 76 × 9 mm of A strips" in row) == (held is PIECE)
     told = {what[:8]: expected for what, expected, _ in first_checks(result, WHOLE).rows}
-    assert "at the target: not at the strip" in told["A strips"]
+    assert "of 2.5: the target's, not the strip's" in told["A strips"]
 
 
 def test_the_first_part_sets_the_time_for_the_coverage_that_is_wanted(folder: Path) -> None:
@@ -518,6 +516,33 @@ def test_the_holder_of_a_strip_is_described_on_a_page_with_room(folder: Path) ->
     assert rows["strip"].startswith("a piece of 76 × 9 mm, cut from an A strip")
     assert "is flush with the ceiling" in rows["block"]
     assert "no opening; those that the part leaves in the walls are closed flush" in rows["block"]
+
+
+def test_plugs_have_a_fit_and_what_lies_on_walls_is_clamped_by_these_alone(folder: Path) -> None:
+    """An arm lies on the wall at +x: the opening of the ceiling has no clamp of its own."""
+    result = load_result(folder)
+    made = FixtureRecord(
+        kind="plugs", size_mm=[], length_mm=0.0, covered_mm2=9.0, covered_target_mm2=0.0
+    )
+    chamber = result.record.chamber.model_copy(update={"fixtures": {"mask": made}})
+    record = result.record.model_copy(update={"chamber": chamber})
+    held = result.design.changed({"holder": {"kind": "bore", "clearance_mm": 0.2}})
+    top = Opening("the ceiling", (0.02, 0.04), (0.0, 0.0, 0.02), 0.01, (0.0, 0.0, 1.0))
+    arm = Opening("the wall", (0.04, 4e-4), (0.02, 0.0, 0.0198), 0.02, (1.0, 0.0, 0.0), "edge")
+    for openings, is_told in (((top,), True), ((top, arm), False)):
+        built = AsBuilt((50.0,), openings, clamp="jaws", screws="3 holes of 7 mm")
+        told = setting_tables(replace(result, design=held, record=record), built)
+        rows = dict(next(one for one in told if one.caption == "Chamber").rows)
+        text = " ".join(cut for name, cut in openings_of_rows(told))
+        assert ("clamp it there" in text) == is_told
+        assert rows["holder"].endswith("by jaws, or by screws through its 3 holes of 7 mm there")
+        assert "of polyamide, turned 0.1 mm larger than the hole, pressed in" in rows["plugs"]
+
+
+def openings_of_rows(tables: list[Table]) -> list[tuple[str, str]]:
+    """The rows on openings of a sheet's tables."""
+    rows = next(one for one in tables if one.caption == "Chamber").rows
+    return [(row[0], row[1]) for row in rows if row[0] == "opening"]
 
 
 def test_what_is_to_be_settled_is_told_once(folder: Path) -> None:
