@@ -1,5 +1,6 @@
 """A part is drawn with its target, or with what is wrong with it."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ from matplotlib.image import imread
 from chamberopt.chamber.build import build_chamber
 from chamberopt.common.errors import InputError
 from chamberopt.design.load import load_design
-from chamberopt.pictures.panels import ALIKE_CAPTION, chamber_dimensions, without_twin
+from chamberopt.pictures import panels
+from chamberopt.pictures.panels import ALIKE_CAPTION, chamber_dimensions, part_panels, without_twin
 from chamberopt.pictures.part import (
     CLEAR,
     HELD,
@@ -102,6 +104,27 @@ def test_the_height_is_that_of_a_wall_on_which_the_part_lies(tmp_path: Path) -> 
     texts = [one.text for one in chamber_dimensions(cavity, np.array([0.5, -0.8, 0.3]))]
     assert "39.8 mm" in texts
     assert "40 mm" not in texts
+
+
+@pytest.mark.parametrize("has_plugs", [True, False])
+def test_plugs_are_in_the_views_from_near_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_plugs: bool
+) -> None:
+    """In the chamber they are with all else that it has."""
+    cavity = cavity_surface(chamber_of(tmp_path, trimesh.creation.box((10.0, 10.0, 10.0))))
+    drawn: list[str] = []
+
+    def view(add: Callable[[None], None], *_: object) -> View:
+        drawn.append("view")
+        add(None)
+        return View(np.zeros((4, 4, 3), dtype=np.uint8), np.eye(3), np.zeros(2), 1.0)
+
+    monkeypatch.setattr(panels, "render_view", view)
+    monkeypatch.setattr(panels, "add_chamber", lambda *_: drawn.append("chamber"))
+    monkeypatch.setattr(panels, "add_body", lambda *one: drawn.append(one[2]))
+    eyes = np.array([1.0, 0.0, 0.0]), [np.array([0.0, 1.0, 0.0])]
+    part_panels(lambda _: None, cavity, cavity, cavity, eyes, has_plugs)
+    assert drawn == ["view", "chamber", "view", *(["mask"] if has_plugs else [])]
 
 
 def test_a_part_is_drawn_only_where_there_can_be_such_a_file(tmp_path: Path) -> None:
