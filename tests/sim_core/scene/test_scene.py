@@ -91,6 +91,30 @@ def test_an_open_an_inside_out_and_a_broken_mesh_are_refused() -> None:
         TriangleMesh(broken, t, tags)
 
 
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_body_wound_the_wrong_way_is_found_whichever_way_its_largest_face_looks(
+    axis: int, sign: float
+) -> None:
+    """A flat tetrahedron stands in the room: its base is its largest face."""
+    corners = 1e-3 * np.array([(1.0, 1.0, 0.0), (4.0, 1.0, 0.0), (1.0, 4.0, 0.0), (2.0, 2.0, sign)])
+    body = np.roll(corners, axis + 1, axis=1) + (0.005, 0.005, 0.005)
+    faces = np.array([(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)])
+    volume = np.linalg.det(body[faces[1:]] - body[0]).sum()
+    inward = faces if volume < 0.0 else faces[:, ::-1]
+    right, wrong = (
+        TriangleMesh(
+            np.concatenate([ROOM.vertices, body]),
+            np.concatenate([ROOM.triangles, one + len(ROOM.vertices)]),
+            np.append(ROOM.tags, np.zeros(4, dtype=ROOM.tags.dtype)),
+        )
+        for one in (inward, inward[:, ::-1])
+    )
+    Scene(right, balls(MIDDLE), Physics(), 1.0)
+    with pytest.raises(SceneError, match="inside out"):
+        Scene(wrong, balls(MIDDLE), Physics(), 1.0)
+
+
 def test_numbers_that_are_none_are_refused() -> None:
     with pytest.raises(SceneError, match="ball 0"):
         Balls(np.array([[math.inf, 0, 0]]), np.zeros((1, 3)), 3e-3)
