@@ -98,7 +98,7 @@ def test_a_body_wound_the_wrong_way_is_found_whichever_way_its_largest_face_look
 ) -> None:
     """A flat tetrahedron stands in the room: its base is its largest face."""
     corners = 1e-3 * np.array([(1.0, 1.0, 0.0), (4.0, 1.0, 0.0), (1.0, 4.0, 0.0), (2.0, 2.0, sign)])
-    body = np.roll(corners, axis + 1, axis=1) + (0.005, 0.005, 0.005)
+    body = 0.005 + np.roll(corners, axis + 1, axis=1)
     faces = np.array([(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)])
     volume = np.linalg.det(body[faces[1:]] - body[0]).sum()
     inward = faces if volume < 0.0 else faces[:, ::-1]
