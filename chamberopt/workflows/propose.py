@@ -39,6 +39,7 @@ from chamberopt.chamber.propose.proposed_intensity import (
     with_prediction,
     with_thin_places,
     with_time,
+    with_usual_intensity,
 )
 from chamberopt.chamber.propose.proposed_mask import LeftOut, find_left_out, in_setting
 from chamberopt.chamber.propose.proposed_setting import setting_of, with_amplitude
@@ -213,6 +214,8 @@ def _written(first: Proposal, pilots: _Pilots, folder: Path) -> Proposed:
         made = pilots.improve(first)
     else:
         made = within_room(first, modest_time(first.design, first.chamber))
+        if pilots.wishes.geometry.alloy:
+            made = with_usual_intensity(made)
     pilots.begin(WRITING)
     made = with_harmless_ranges(made)
     if made.chamber is not first.chamber:

@@ -399,6 +399,19 @@ def with_expected_intensity(made: Proposal, predicted: PredictedIntensity | None
     return replace(made, reasons=reasons, expected=predicted, usual=usual)
 
 
+def with_usual_intensity(made: Proposal) -> Proposal:
+    """Return a proposal without a pilot that tells the usual intensity of a stated alloy."""
+    metal = alloy(made.tables["materials"]["part"])
+    usual = usual_intensity(metal, thickness_under_target(made.chamber.part))
+    if usual is None:
+        return made
+    text = (
+        f"not estimated without a pilot; {usual.low:g}-{usual.high:g}A are {usual.text}, which "
+        "balls that are small for a narrow slot or fillet may not give: leave out --no-pilot"
+    )
+    return replace(made, reasons={**made.reasons, INTENSITY: text})
+
+
 def with_thin_places(made: Proposal) -> Proposal:
     """Return a proposal that names places of its target for which no intensity is usual."""
     thin = thinnest(made.chamber.part)

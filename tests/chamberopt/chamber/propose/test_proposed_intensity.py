@@ -30,6 +30,7 @@ from chamberopt.chamber.propose.proposed_intensity import (
     usual_for,
     with_expected_intensity,
     with_thin_places,
+    with_usual_intensity,
 )
 from chamberopt.chamber.propose.proposed_setting import (
     AMPLITUDE_POWER,
@@ -369,6 +370,8 @@ def test_without_a_wish_the_expected_intensity_stands_beside_the_usual_one(
     """A plate of 8 mm of titanium, 0.006 to 0.010 in; of nickel there is no usual range."""
     made = propose(plate, Wanted("mm", shop=shop, alloy="Ti-6Al-4V"), lambda _: [])
     assert "not known" in with_expected_intensity(made, None).reasons[INTENSITY]
+    without = with_usual_intensity(made).reasons[INTENSITY]
+    assert without.startswith("not estimated without a pilot; 0.15-0.25A are usual for titanium")
     predicted = PredictedIntensity(0.31, 0.05, 1.9, 2.5)
     told = with_expected_intensity(made, predicted).reasons[INTENSITY]
     assert (
@@ -384,6 +387,7 @@ def test_without_a_wish_the_expected_intensity_stands_beside_the_usual_one(
     wanted = usual_for(made)
     assert (wanted.low, wanted.high) == (0.15, 0.25)
     nickel = propose(plate, Wanted("mm", shop=shop, alloy="IN718"), lambda _: [])
+    assert with_usual_intensity(nickel) is nickel
     assert "no range for nickel" in with_expected_intensity(nickel, predicted).reasons[INTENSITY]
     with pytest.raises(InputError, match=r"--intensity: given usual, but .*nickel"):
         usual_for(nickel)
