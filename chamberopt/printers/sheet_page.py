@@ -318,7 +318,7 @@ def write_sheet(
             largest_flat_face(part),
             part_is_ceiling(chamber),
             outside_clamp(chamber, design.effects.part_turn is not None).text,
-            "" if design.effects.part_turn else holes_for_screws(design, chamber),
+            "" if design.effects.part_turn else holes_for_screws(chamber),
             None if push is None else (float(push[0]), float(push[1]), float(push[2])),
             float(tetrahedron_volumes(part.vertices, part.triangles).sum()),
             places,

@@ -36,7 +36,7 @@ def clamped_outside(made: Proposal, floor: Floor, shop: Shop | None) -> Proposal
     tables = with_table(made.tables, "sonotrode", "holder", keys)
     by = f" by {clamp.text}" if (clamp := _clamp(made)).text else ""
     if not _turns(made):
-        holes = holes_for_screws(made.design, made.chamber)
+        holes = holes_for_screws(made.chamber)
         by += f", or by screws through its {holes} there" if holes else ""
     holds = "turned" if _turns(made) else "clamped"
     sides = ", ".join(sides_out(made.chamber))
