@@ -207,6 +207,7 @@ def test_a_holder_that_hides_more_is_taken_where_no_other_holds(
     )
     monkeypatch.setattr(held_proposal, "holder_choices", lambda *_: choices)
     monkeypatch.setattr(held_proposal, "_harmless", harmless)
+    monkeypatch.setattr(held_proposal, "_by_a_rod", lambda _: "")
     monkeypatch.setattr(held_proposal, "touched_share", lambda one: one.share)
     monkeypatch.setattr(held_proposal, "_with_balls_on_holder", lambda one: one)
     monkeypatch.setattr(held_proposal, "replace", lambda one, **_: SimpleNamespace(number=None))
