@@ -427,8 +427,7 @@ class Acts:
         sweeps = ["--sobol", str(int(asked["points"]))] if command == "sweep" else []
         own = f"-{effort}" if scaled else "-sweep" if sweeps else ""
         folder = self._free_folder(f"{what.stem}{own}")
-        is_bare = asked.get("ranges") is False or (scaled and effort == "quick")
-        ranges = ["--no-ranges"] if not sweeps and is_bare else []
+        ranges = ["--no-ranges"] if not sweeps and asked.get("ranges") is False else []
         arguments = [command, name, *scaled, *sweeps, *ranges, "--out", folder]
         return self._command.start(arguments, self._path.parent, "" if sweeps else folder)
 

@@ -72,8 +72,8 @@ def foretold(path: Path, results: Iterable[Path], ranges: bool = True) -> dict[s
     Args:
         path: file of the design or study.
         results: folders of results, the newest first.
-        ranges: whether the ends of what is not calibrated are simulated too. A quick look, and a
-            study, leave that to themselves.
+        ranges: whether the ends of what is not calibrated are simulated too. A study leaves that to
+            itself.
     """
     evaluations = 1
     if is_study(read_toml(path, "design")[1]):
@@ -189,7 +189,7 @@ def _by_moment(
             f"{plain(accuracy.gauge_mm2)} mm², where {DENTS_FOR_PLACES:g} would do; "
             f"{_remedy(accuracy.simulated_time_s, scale, DENTS_FOR_PLACES / dents)}"
         )
-    return Foretold(_at_pace(taken, pace, ranges and scale != "quick"), few)
+    return Foretold(_at_pace(taken, pace, ranges), few)
 
 
 def _remedy(time_s: float, scale: Scale | None, times: float) -> str:
@@ -201,7 +201,7 @@ def _remedy(time_s: float, scale: Scale | None, times: float) -> str:
     if scale == "quick":
         return "take more of it"
     enough = MARGIN * times * time_s / (SCALES[scale] if scale else 1.0)
-    return f"it takes process.accuracy.simulated_time_s = {plain(float(f'{enough:.2g}'))}"
+    return f"it takes process.accuracy.simulated_time_s = {plain(float(f'{enough:.2g}'))} s"
 
 
 def _at_pace(design: Design, pace: float, ranges: bool) -> str:
@@ -222,7 +222,7 @@ def _at_pace(design: Design, pace: float, ranges: bool) -> str:
 def _by_result(design: Design, scale: Scale | None, result: Result, ranges: bool) -> Foretold:
     """Return how long an effort takes by a result of a like design, and if it is too little."""
     taken = scaled(design, scale)
-    seconds = _whole_seconds(taken, 1, result, ranges and scale != "quick")
+    seconds = _whole_seconds(taken, 1, result, ranges)
     needed = result.record.field.simulated_s_needed.mean_and_std
     accuracy, few = taken.process.accuracy, ""
     most = Effort.of(accuracy).most * accuracy.simulated_time_s

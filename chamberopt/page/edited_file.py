@@ -441,7 +441,7 @@ def design_fields(file: EditedFile) -> list[dict[str, object]]:
         row = {
             "name": name,
             "value": design.setting(name),
-            "choices": choices(allowed),
+            "choices": choices(name, allowed),
             "text": text,
         }
         row |= {"reason": reasons.get(name, "")}
@@ -494,7 +494,7 @@ def _structure_rows(file: EditedFile) -> Iterator[dict[str, Any]]:
     texts |= {MASK_KIND: "what keeps the shot from the faces that it covers"}
     reasons = comments(file.text)
     for name, allowed in file.structure.items():
-        row = {"name": name, "value": values[name], "choices": choices(allowed)}
+        row = {"name": name, "value": values[name], "choices": choices(name, allowed)}
         yield row | {"text": texts[name]} | {"reason": reasons.get(name, ""), "is_structure": True}
 
 

@@ -125,8 +125,8 @@ class Front:
             "shops": [name for name, kind in tables if kind == "shop"],
             "calibrations": [name for name, kind in tables if kind == "calibration"],
             "alloys": alloy_suggestions(),
-            "balls": choices([one.name for one in balls()]),
-            "shapes": choices(SHAPES),
+            "balls": choices("shot.material", [one.name for one in balls()]),
+            "shapes": choices("chamber.shape", SHAPES),
         }
 
     def upload(self, name: str, content: bytes) -> dict[str, object]:

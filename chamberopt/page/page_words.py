@@ -194,6 +194,7 @@ def names_met(text: str) -> list[str]:
     return _MET_NAME.findall(found[1]) if found else []
 
 
-def choices(allowed: tuple[str, ...] | list[str]) -> list[tuple[str, str]]:
-    """Return each allowed text with its words on the page."""
-    return [(one, CHOICES.get(one, one.replace("_", " "))) for one in allowed]
+def choices(name: str, allowed: tuple[str, ...] | list[str]) -> list[tuple[str, str]]:
+    """Return each text that is allowed for a name of a design, with its words on the page."""
+    words = CHOICES | {"": "none: nothing is covered"} if name == "mask.kind" else CHOICES
+    return [(one, words.get(one, one.replace("_", " "))) for one in allowed]

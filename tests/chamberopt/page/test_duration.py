@@ -94,7 +94,7 @@ def test_too_little_is_told_before_with_the_remedy(result: Result) -> None:
     short = result.design.changed({f"{key}replicas": 10, f"{key}simulated_time_s": 2.0})
     few = _by_result(short, None, like, ranges=False).few
     told = "too little to tell the mean coverage, as the result result shows: "
-    assert few == f"{told}it takes process.accuracy.simulated_time_s = 3.3"
+    assert few == f"{told}it takes process.accuracy.simulated_time_s = 3.3 s"
     assert _by_result(short, "quick", like, ranges=False).few == f"{told}take more of it"
     assert _by_result(short, "thorough", like, ranges=False).few == ""
     enough = short.changed({f"{key}simulated_time_s": 3.3})
@@ -111,7 +111,7 @@ def test_too_few_dents_are_told_by_a_moment(result: Result) -> None:
         return _by_moment(design, scale, 1.0, 1e6, False).few
 
     told = "too little to tell single places: about {} dents in each window of 2 mm², where 25 "
-    assert few(None) == f"{told.format(10)}would do; it takes {key}simulated_time_s = 1.4"
+    assert few(None) == f"{told.format(10)}would do; it takes {key}simulated_time_s = 1.4 s"
     assert few("quick") == f"{told.format('2.5')}would do; take more of it"
     assert few("thorough") == ""
     assert _by_moment(design, None, 1.0, 0.0, False).few == ""  # not known

@@ -187,7 +187,7 @@ def test_a_study_is_asked_with_limits_in_the_units_of_the_page(served: Served) -
 def test_a_report_is_begun_beside_a_command(served: Served) -> None:
     asked = {"command": "simulate", "of": "design.toml", "effort": "quick"}
     started = served.ask("/start", asked)
-    assert "--effort=quick --no-ranges --out results/design-quick" in started["command"]
+    assert "--effort=quick --out results/design-quick" in started["command"]
     assert started["exit"] is None
     now = served.ask("/make", {"paper": "sheet", "of": "results/none"})
     assert now["command"] == "chamberopt report ./results/none --sheet"
