@@ -11,7 +11,7 @@ class Section {
   #fills = new Map();
   #outlines = new Map(); // ends of the lines that bound each body in the plane
   #stale = false;
-  #spares = ""; // body that stays whole, as a drawing does not cut a shaft
+  #spares = []; // bodies that stay whole, as a drawing does not cut a shaft
 
   constructor(view) {
     this.view = view;
@@ -19,10 +19,10 @@ class Section {
     this.on = false;
   }
 
-  // Cut by the plane of a unit normal at a distance from the origin; the normal points to what is kept. A body may stay whole.
-  cut(normal, distance, spares = "") {
+  // Cut by the plane of a unit normal at a distance from the origin; the normal points to what is kept. Bodies may stay whole.
+  cut(normal, distance, spares = []) {
     this.plane.set(new THREE.Vector3(...normal), -distance);
-    if (spares !== this.#spares) this.off();
+    if (`${spares}` !== `${this.#spares}`) this.off();
     this.#spares = spares;
     if (!this.on) {
       this.on = true;
@@ -111,7 +111,7 @@ class Section {
     for (const body of Section.BODIES) this.#fill(body);
   }
 
-  #cuts(name) { return name in Section.SURFACES ? Section.SURFACES[name][0] !== this.#spares : ["", "edges", "rim"].includes(name); }
+  #cuts(name) { return name in Section.SURFACES ? !this.#spares.includes(Section.SURFACES[name][0]) : ["", "edges", "rim"].includes(name); }
   #kindOf(body) { return Object.values(Section.SURFACES).find(([one]) => one === body)[1]; }
   #order(body = "part") { return 10 + 2 * Section.BODIES.indexOf(body); }
   #clip(material, planes) { Object.assign(material, { clippingPlanes: planes, needsUpdate: true }); }

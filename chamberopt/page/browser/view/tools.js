@@ -137,7 +137,7 @@ class Tools {
   #apply() {
     const { normal, sign, from } = this.#cut, way = this.#isFlipped ? -1 : 1;
     const distance = from + sign * Number(this.at.value);
-    for (const view of this.views) view.section.cut(normal.map((x) => way * x), way * distance, this.cutsPart.checked ? "" : "part");
+    for (const view of this.views) view.section.cut(normal.map((x) => way * x), way * distance, this.cutsPart.checked ? [] : ["part", "mask"]); // plugs are in the part
   }
 
   // A button that hides the surfaces of a kind in all views, and shows them again.
