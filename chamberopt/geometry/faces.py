@@ -32,10 +32,16 @@ class Faces:
         triangles: vertex indices, shape (m, 3).
         border: largest angle between the normals of neighbours in one face [degrees], or the number
             of each triangle's face in a CAD file, (m,).
+        uncut: number of each triangle's face in a CAD file, (m,), -1 for none. An angle cuts none
+            of these faces. None: there are none.
     """
 
     def __init__(
-        self, vertices: np.ndarray, triangles: np.ndarray, border: float | np.ndarray
+        self,
+        vertices: np.ndarray,
+        triangles: np.ndarray,
+        border: float | np.ndarray,
+        uncut: np.ndarray | None = None,
     ) -> None:
         normal = unit_vectors(area_vectors(vertices, triangles))
         self._neighbours = side_pairs(triangles) // 3  # (e, 2)
@@ -46,6 +52,8 @@ class Faces:
             smooth = np.einsum("ij,ij->i", normal[one], normal[two]) > np.cos(np.radians(border))
             # A triangle without area has no normal. It belongs to the faces of its neighbours.
             smooth |= ~normal[one].any(axis=1) | ~normal[two].any(axis=1)
+            if uncut is not None:
+                smooth |= (uncut[one] == uncut[two]) & (uncut[one] >= 0)
         self.of_triangle = connected_pieces(one[smooth], two[smooth], len(triangles))[1]  # (m,)
         self.count = int(self.of_triangle.max()) + 1
         self._corners, self._normal = vertices[triangles], normal

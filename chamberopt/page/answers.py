@@ -25,6 +25,7 @@ from chamberopt.chamber.layout.target import (
     named_surfaces,
     names_within,
     surfaces,
+    why_unnamed,
 )
 from chamberopt.chamber.part import chosen_on_part, chosen_triangles, named_surface, preview_part
 from chamberopt.chamber.reach import reached_part_share
@@ -83,14 +84,17 @@ def surfaces_answer(mesh: PartMesh) -> bytes:
 
     `rows` are the names with their sizes in words. `face` is the number of the face of each
     triangle, and `names` has the name that a click on a face means. A fillet is a face of its own.
+    `unnamed` is why another face has no name, in words.
     """
-    face = mesh.numbering.cad_face
-    if face is None:
+    if mesh.numbering.cad_face is not None:
+        face = mesh.faces(None).of_triangle
+    else:
         creased = mesh.faces(crease_deg(mesh)).of_triangle
         both = np.stack([creased, fillets_of(mesh).of_triangle], axis=1)
         face = np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
     rows = [[one.name, one.text] for one in _surfaces(mesh)]
-    return packed({"rows": rows, "names": face_names(mesh, face)}, face=face)
+    head = {"rows": rows, "names": face_names(mesh, face), "unnamed": why_unnamed(mesh)}
+    return packed(head, face=face)
 
 
 def picked_answer(mesh: PartMesh, picked: Sequence[Picked]) -> bytes:

@@ -290,6 +290,13 @@ def crease_deg(mesh: PartMesh) -> float:
     return next((one for one in tried if not mesh.faces(one).are_facets.any()), tried[-1])
 
 
+def why_unnamed(mesh: PartMesh) -> str:
+    """Return why some of a part's faces are in no surface of `surfaces`, in words."""
+    if mesh.faces(crease_deg(mesh)).are_facets.any():
+        return "it is a facet: the triangles of the file are too coarse for faces"
+    return f"only the {MAX_KINDS} largest kinds of faces are named"
+
+
 def _stand_in_ring(mesh: PartMesh, alike: Surface) -> bool:
     """Return whether faces that are alike stand evenly round an axis."""
     return is_ring(mesh.faces(crease_deg(mesh)), mesh.vertices, mesh.triangles, alike.triangles)

@@ -67,13 +67,15 @@ class PartMesh:
     def faces(self, crease_deg: float | None) -> Faces:
         """Return the part's faces, which end where the surface turns by an angle [degrees].
 
-        For None they are those of the CAD file. Raises InputError if the file has none.
+        An angle cuts no face of a CAD file, whose triangles turn by much where it bends tightly.
+        For None they are the faces of the CAD file. Raises InputError if the file has none.
         """
-        border = self.numbering.cad_face if crease_deg is None else crease_deg
+        cad_face = self.numbering.cad_face
+        border = cad_face if crease_deg is None else crease_deg
         if border is None:
             text = "the part's file has no faces of its own, as STEP has; leave cad_face out"
             raise InputError(text)
-        return Faces(self.vertices, self.triangles, border)
+        return Faces(self.vertices, self.triangles, border, cad_face)
 
     def divided(self, vertices: np.ndarray, triangles: np.ndarray, origin: np.ndarray) -> PartMesh:
         """Return the part in other triangles, with the numbers and groups of its own.

@@ -137,6 +137,7 @@ async function lightTicked() {
 find("names").addEventListener("pointerleave", () => { if (ticked().some((one) => one.checked)) attempt(lightTicked); });
 view.hearClicks((event) => attempt(async () => {
   const hit = choosable && !view.get("walls") ? view.at(event, ["part"]) : null, name = hit && choosable.names[choosable.face[hit.triangle]];
+  if (hit && !name) throw new Error(`this face cannot be chosen here, as ${choosable.unnamed}; the tab Target of an open design takes it by a click`);
   if (!name) return;
   const one = box(name);
   one.checked = !one.checked;

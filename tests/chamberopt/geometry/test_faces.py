@@ -96,3 +96,14 @@ def test_facets_are_what_a_coarse_surface_is_made_of() -> None:
     assert faces_of(fine, 1.0).are_facets.all()
     assert not faces_of(coarse, 1.0).are_facets.any()  # of 80 none is tiny
     assert not faces_of(trimesh.creation.box()).are_facets.any()
+
+
+def test_an_angle_cuts_no_face_that_is_to_stay_whole() -> None:
+    """Six sides of a prism of twelve are one face; each other side, of no number, is its own."""
+    prism = trimesh.creation.cylinder(1.0, 2.0, sections=12)
+    vertices, triangles = np.asarray(prism.vertices), np.asarray(prism.faces)
+    sides = np.abs(prism.face_normals[:, 2]) < 0.5
+    uncut = np.where(sides & (prism.triangles_center[:, 0] > 0.0), 5, -1)
+    faces = Faces(vertices, triangles, 29.0, uncut)
+    assert faces.count == 2 + 1 + 6
+    assert len(np.unique(faces.of_triangle[uncut == 5])) == 1

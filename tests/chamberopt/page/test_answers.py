@@ -1,11 +1,13 @@
 """What the page is told of a part, in the bytes that it takes apart."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import CrossSection, Manifold
 
 from chamberopt.chamber.layout.target import find_surface, surfaces
 from chamberopt.chamber.part import preview_part
@@ -26,6 +28,7 @@ from chamberopt.page.answers import (
     surfaces_answer,
 )
 from chamberopt.page.picking import Picked
+from tests.chamberopt.chamber.layout.test_arbor import part_of
 from tests.chamberopt.chamber.test_target import design_of
 
 FIR_TREE = Path(__file__).resolve().parents[3] / "designs/parts/fir_tree.step"
@@ -84,6 +87,25 @@ def test_a_click_on_each_face_means_a_surface_that_can_be_peened(tmp_path: Path)
         assert head["arrays"]["face"][1] == len(mesh.triangles)
         for name in set(head["names"].values()):
             assert find_surface(mesh, surfaces(mesh), name).triangles.any()
+
+
+def test_a_surface_holds_whole_faces_of_a_cad_file() -> None:
+    """The back of a vane goes on round its edge, a strip of 1 mm, over which it turns sharply."""
+    outline = [[0, 0], [20, -3], [40, -0.5], [40, 0.5], [20, 3]]
+    mesh, body = part_of(Manifold.extrude(CrossSection([outline]), 30.0))
+    looks = body.face_normals
+    back, strip = looks[:, 1] > 0.5, looks[:, 0] > 0.9
+    cad_face = np.select([looks[:, 2] > 0.5, looks[:, 2] < -0.5, back | strip], [0, 1, 2], 3)
+    assert 2 not in face_names(mesh, cad_face)  # a crease parts the strip from the back
+    mesh = replace(mesh, numbering=replace(mesh.numbering, cad_face=cad_face))
+    names = face_names(mesh, mesh.faces(None).of_triangle)
+    assert len(names) == mesh.faces(None).count == 4
+    for one in surfaces(mesh):
+        for face in range(4):
+            assert len(np.unique(one.triangles[cad_face == face])) == 1
+    answer = surfaces_answer(mesh)
+    head = json.loads(answer[4 : 4 + int.from_bytes(answer[:4], "little")])
+    assert len(head["names"]) == 4
 
 
 def test_the_triangles_of_a_surface_are_those_of_its_name(tmp_path: Path) -> None:
