@@ -94,7 +94,8 @@ export function faceInWords(triangles, triangle, place) {
     area += b.sub(a).cross(c.sub(a)).length() / 2;
   }
   const isFlat = triangles.every((k) => normals[k].dot(first) > Measure.PARALLEL), round = isFlat ? null : Round.of(mesh, triangle, place);
-  return `${isFlat ? "flat" : round ? `round, ${Measure.across(round)}` : "curved"}, ${short(area)} mm²`;
+  const bend = !round ? "curved" : round.isRough ? `curved, ${Measure.across(round)} here` : `round, ${Measure.across(round)}`;
+  return `${isFlat ? "flat" : bend}, ${short(area)} mm²`;
 }
 
 const CHOSEN = { holder: "clamped by the holder", mask: "covered by the mask" };

@@ -373,6 +373,26 @@ def test_a_click_on_a_fillet_that_goes_round_measures_its_radius(opened: Page) -
     assert opened.page.evaluate(of) == ["R about 2.5 mm"] * 3
 
 
+def test_the_radius_of_a_freeform_face_is_told_roughly(opened: Page) -> None:
+    """Half an ellipse of 10 and 9 mm, and of 10 and 10 mm: a radius that differs, and one that not.
+
+    The ellipse bends with a radius between 9² / 10 = 8.1 and 10² / 9 = 11.1 mm.
+    """
+    of = """(high) => {
+      const points = [], index = [], sides = 90;
+      for (let k = 0; k <= sides; k++) {
+        const turn = Math.PI * k / sides, x = 10 * Math.cos(turn), z = high * Math.sin(turn);
+        points.push(x, 0, z, x, 20, z);
+        if (k < sides) index.push(2 * k, 2 * k + 1, 2 * k + 3, 2 * k, 2 * k + 3, 2 * k + 2);
+      }
+      const mesh = new THREE.Mesh();
+      Object.assign(mesh.userData, { points, index });
+      return Measure.across(Round.of(mesh, 90, new THREE.Vector3(0, 10, high)));
+    }"""
+    assert opened.page.evaluate(of, 10) == "R 10 mm"
+    assert opened.page.evaluate(of, 9) in ("R about 11 mm", "R about 10 mm")
+
+
 def test_the_legend_hides_a_kind_and_the_view_turns_to_an_axis(opened: Page) -> None:
     page, wall = opened.page, opened.page.locator("#legend").get_by_role("button", name="wall")
     way = [0.0, 0.0, 0.0]

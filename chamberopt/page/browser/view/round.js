@@ -5,6 +5,7 @@ class Round {
   static SMOOTH = Math.cos(31 * Math.PI / 180); // between facets of one round surface
   static ALONG = 0.02; // of a facet's normal along the axis, sine
   static AWAY = 0.01; // of the radius, between a corner and the circle
+  static EXACT = 0.001; // likewise, where the radius is the same all over; of a freeform surface it differs
   static SWEEP = Math.PI / 4; // least that a round surface turns
   static FACETS = 6; // least of a round surface, as any three points lie on a circle
   static CORNERS = 12; // least of a round border
@@ -72,7 +73,7 @@ class Round {
     const gap = turns.reduce((most, turn, i) => Math.max(most, (turns[i + 1] ?? turns[0] + 2 * Math.PI) - turn), 0);
     const facets = turns.filter((turn, i) => !i || turn - turns[i - 1] > Round.OTHER).length;
     return 2 * Math.PI - gap < Round.SWEEP || facets < Round.FACETS ? null
-      : { ...plane.on(circle, place.dot(axis)), count: all.length, isArc: gap > Math.PI };
+      : { ...plane.on(circle, place.dot(axis)), count: all.length, isArc: gap > Math.PI, isRough: !Round.#lie(circle, all.flatMap(corners), Round.EXACT) };
   }
 
   // The circle of the cut in which a surface bends most at a place of a triangle: of a torus, round its tube.
@@ -153,7 +154,7 @@ class Round {
       at: (angle) => at(x + radius * Math.cos(angle), y + radius * Math.sin(angle), height) }) };
   }
 
-  static #lie({ x, y, radius }, points) { return points.every((one) => Math.abs(Math.hypot(one[0] - x, one[1] - y) - radius) < Round.AWAY * radius); }
+  static #lie({ x, y, radius }, points, away = Round.AWAY) { return points.every((one) => Math.abs(Math.hypot(one[0] - x, one[1] - y) - radius) < away * radius); }
 
   // The circle nearest to points by least squares of x² + y² = 2 a x + 2 b y + c, about their middle; null for a line.
   static #circle(points) {
