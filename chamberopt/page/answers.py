@@ -199,10 +199,18 @@ def shape_answer(design: Design, step: int = 0) -> bytes:
         "target_triangles": int(part.target.sum()),
         "balls": design.shot.count,
         "zones": [*part.zones],  # zone k + 1 has name k
+        "awaited": _awaited(design),
         "form": _form(design),
     }
     surface = _surface(shape.vertices, shape.triangles, shape.tags, design.sonotrode.face)
     return packed(head, **surface, **_block(design), state=state, zone=zone)
+
+
+def _awaited(design: Design) -> list[str]:
+    """Return which fixtures of a design are drawn once its chamber is built."""
+    holder, mask = design.holder, design.mask
+    there = {"holder": holder is not None and holder.kind != "bore", "mask": mask is not None}
+    return [name for name, is_there in there.items() if is_there]
 
 
 def _form(design: Design) -> str:

@@ -53,6 +53,7 @@ async function draw(part) {
   for (const name of ["part", ...CHAMBER]) view.remove(name);
   tools.renew();
   tools.close();
+  view.awaited = [];
   drawnPart = drawn;
   if (!part) return;
   const told = unpack(await ask("/view", { part, unit: known.unit }));
@@ -84,6 +85,7 @@ async function drawChamber(isDraft) {
   colourByState(view, "part", seen, answer.state);
   for (const name of CHAMBER) view.remove(name); // of the proposal before
   view.show(["part"], true);
+  view.awaited = answer.awaited;
   drawBodies(view, answer, seen.edges);
   drawDimensions(view, answer);
   const [low, high] = answer.shape_mm;
@@ -97,6 +99,7 @@ async function drawChamber(isDraft) {
 async function drawCavity(isDraft) {
   const shown = view.get("walls"), cavity = await ask("/chamber", { exact: true }).then(unpack, () => null); // the proposal says what is wrong
   if (!cavity || view.get("walls") !== shown) return;
+  view.awaited = [];
   drawBodies(view, cavity, seen.edges);
   const own = cavity.part_points ? "remeshed" : "part";
   if (own === "remeshed") view.surface(own, { points: cavity.part_points.slice(), triangles: cavity.part_triangles.slice(), open: !seen.closed });

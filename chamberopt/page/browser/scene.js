@@ -22,6 +22,7 @@ export function showShape(answer) {
   view.pose("part", answer.rotation, answer.shift);
   view.get("part").visible = true;
   for (const name of ["remeshed", ...BODIES]) view.remove(name); // until the cavity is cut anew
+  view.awaited = answer.awaited;
   colour("part", answer.state);
   walls(answer);
   const first = !placed;
@@ -35,6 +36,7 @@ export function showShape(answer) {
 // What `cavity` answers: exactly what the shot flies in.
 export function showCavity(answer) {
   for (const name of ["remeshed", ...BODIES]) view.remove(name); // of the cavity before
+  view.awaited = [];
   walls(answer);
   if (answer.part_points) view.surface("remeshed", { points: answer.part_points.slice(), triangles: answer.part_triangles.slice(), open: !part.closed });
   view.show(["part"], !answer.part_points);
@@ -98,7 +100,6 @@ export function faceInWords(triangles, triangle, place) {
   return `${isFlat ? "flat" : bend}, ${short(area)} mm²`;
 }
 
-const CHOSEN = { holder: "clamped by the holder", mask: "covered by the mask" };
 let toldOfFace = null; // gives words on the face that is met, and on what a click does with it
 export function tellOfFace(tell) { toldOfFace = tell; }
 // What is said of the place under the pointer: how the part's file names its surface, what face it is, whether it is in the target, and where.
@@ -108,7 +109,7 @@ view.renderer.domElement.addEventListener("pointermove", (event) => {
   under.hidden = !hit;
   if (!hit) return;
   const name = part.groups[part.surface?.[hit.triangle]], [kind] = part.kinds[part.states[placed.state[hit.triangle]]];
-  const zone = placed.zones[placed.zone[hit.triangle] - 1], words = CHOSEN[part.states[placed.state[hit.triangle]]] ?? kind;
+  const zone = placed.zones[placed.zone[hit.triangle] - 1], words = Tools.ON_PART[part.states[placed.state[hit.triangle]]] ?? kind;
   const [face, remedy] = toldOfFace?.(hit, part.states[placed.state[hit.triangle]]) ?? [];
   const said = [face?.startsWith(`${name},`) ? "" : name, face, words === "zone" ? `zone ${zone}` : words, `at ${Measure.at(hit.place)}`].filter(Boolean).join(", ");
   under.textContent = [said, remedy].filter(Boolean).join(": ");

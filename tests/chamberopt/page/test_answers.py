@@ -175,3 +175,22 @@ def test_packed_arrays_begin_at_words_and_are_read_as_the_page_does(text: str) -
         assert found == pytest.approx(values.ravel())
         at += -(-found.nbytes // 4) * 4
     assert at == len(content)
+
+
+@pytest.mark.parametrize(
+    ("changes", "awaited"),
+    [
+        ({}, []),
+        ({"holder": {"kind": "rod"}}, ["holder"]),
+        (
+            {"mask": {"thickness_mm": 1.0, "at": {"direction": (0, 0, 1), "angle_deg": (0, 30)}}},
+            ["mask"],
+        ),
+    ],
+)
+def test_holder_and_mask_are_drawn_once_the_chamber_is_built(
+    tmp_path: Path, changes: dict[str, object], awaited: list[str]
+) -> None:
+    answer = shape_answer(design_of(tmp_path, {}).changed(changes))
+    head = json.loads(answer[4 : 4 + int.from_bytes(answer[:4], "little")])
+    assert head["awaited"] == awaited

@@ -393,6 +393,33 @@ def test_the_radius_of_a_freeform_face_is_told_roughly(opened: Page) -> None:
     assert opened.page.evaluate(of, 9) in ("R about 11 mm", "R about 10 mm")
 
 
+def test_the_legend_says_that_a_holder_is_drawn_later(opened: Page) -> None:
+    """Until the chamber is built there are but the faces that it clamps."""
+    page, legend = opened.page, opened.page.locator("#legend")
+    before = legend.text_content() or ""
+    page.evaluate(
+        """async () => {
+          const { view } = await import("/browser/scene.js"), { userData } = view.get("part");
+          globalThis.kinds = userData.kinds;
+          Object.assign(userData, { kinds: [...userData.kinds, "holder"] });
+          view.awaited = ["holder"];
+          view.draw();
+        }"""
+    )
+    expect(legend).to_contain_text("the holder is drawn once the chamber is built")
+    expect(legend.locator("li", has_text="clamped by the holder")).to_have_count(1)
+    expect(legend.locator("[data-kind=holder]")).to_have_count(0)
+    page.evaluate(
+        """async () => {
+          const { view } = await import("/browser/scene.js");
+          view.get("part").userData.kinds = globalThis.kinds;
+          view.awaited = [];
+          view.draw();
+        }"""
+    )
+    expect(legend).to_have_text(before)
+
+
 def test_the_legend_hides_a_kind_and_the_view_turns_to_an_axis(opened: Page) -> None:
     page, wall = opened.page, opened.page.locator("#legend").get_by_role("button", name="wall")
     way = [0.0, 0.0, 0.0]
@@ -633,7 +660,7 @@ def test_shape_and_holder_are_chosen_in_words(opened: Page) -> None:
     page.click("#of-holder summary")
     shown("holder.kind").select_option(label="rod on a face")
     expect(shown("holder.axis.2")).to_have_value("1", timeout=WAIT)
-    expect(page.locator("#legend")).to_contain_text("holder", timeout=WAIT)  # the cavity is cut
+    expect(page.locator("#legend [data-kind=holder]")).to_be_visible(timeout=WAIT)  # it is cut
     assert page.locator("#error").is_hidden()
     shown("holder.kind").select_option(label="none: the part hangs in the air")
     expect(shown("holder.axis.2")).to_have_count(0)
@@ -721,7 +748,7 @@ def test_a_click_picks_the_face_and_turns_it_down(opened: Page) -> None:
     opened.wait("data-checked=reach")
     opened.page.select_option("#surface", label="what a mask covers")
     opened.click_side()
-    expect(opened.page.locator("#legend")).to_contain_text("mask", timeout=WAIT)
+    expect(opened.page.locator("#legend [data-kind=mask]")).to_be_visible(timeout=WAIT)
     opened.page.click("#undo")
     opened.page.select_option("#surface", label="the target")
     side = opened.click_side()

@@ -3,6 +3,7 @@
 "use strict";
 class Tools {
   static CHAMBER = ["wall", "sonotrode", "holder", "mask"]; // kinds that are no part
+  static ON_PART = { holder: "clamped by the holder", mask: "covered by the mask" }; // faces of the part
   // Names of views, and the way from what is looked at to the eye. A little aside, as z is up.
   static WAYS = { Front: [[0, -1, 0], "along y"], Back: [[0, 1, 0], "against y"], Left: [[-1, 0, 0], "along x"],
     Right: [[1, 0, 0], "against x"], Top: [[0, -1e-4, 1], "from above"], Bottom: [[0, -1e-4, -1], "from below"],
@@ -162,18 +163,25 @@ class Tools {
       view.hearKinds((names) => {
         now[i] = names;
         const there = Object.keys(kinds).filter((name) => now.flat().includes(name));
-        if (there.join() !== listed) list.replaceChildren(...there.map((name) => this.#item(name, kinds[name])));
-        listed = there.join();
+        const awaited = view.awaited.filter((name) => !view.isSurface(name)).map((name) => `the ${name} is drawn once the chamber is built`);
+        const told = [...there.map((name) => this.#label(name, kinds[name][0])), ...awaited];
+        if (told.join() !== listed) list.replaceChildren(...there.map((name) => this.#item(name, kinds[name])), ...awaited.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+        listed = told.join();
         for (const button of list.querySelectorAll("button")) button.ariaPressed = String(!view.hides(button.dataset.kind));
         this.#showSwitch(there.filter((name) => Tools.CHAMBER.includes(name)));
       });
     });
   }
 
+  #isSurface(kind) { return this.views.some((one) => one.isSurface(kind)); }
+
+  // What a kind is called: of a holder or mask that is not drawn there are its faces on the part alone.
+  #label(kind, label) { return this.#isSurface(kind) ? label : Tools.ON_PART[kind] ?? label; }
+
   #item(name, [label, colour]) {
     const item = document.createElement("li"), patch = document.createElement("i");
     patch.style.background = colour;
-    item.append(...(this.views.some((one) => one.isSurface(name)) ? [this.#hider(name, patch, label)] : [patch, label]));
+    item.append(...(this.#isSurface(name) ? [this.#hider(name, patch, label)] : [patch, this.#label(name, label)]));
     return item;
   }
 

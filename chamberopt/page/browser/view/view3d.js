@@ -56,6 +56,7 @@ class View3D {
     this.triadCamera.up.set(0, 0, 1);
     this.section = new Section(this);
     this.kinds = {}; // label and colour of each kind of surface
+    this.awaited = []; // kinds of surfaces that are drawn later
     this.tool = null; // what takes a click instead of those who wait for clicks
     let from = null; // a click is not a turn of the view
     renderer.domElement.addEventListener("pointerdown", (event) => { from = [event.clientX, event.clientY]; });
@@ -449,7 +450,7 @@ class View3D {
   #tellKinds() {
     const isThere = ({ visible, userData }) => visible || this.#hidden.has(userData.kind);
     const there = this.all().filter(([, mesh]) => isThere(mesh)).flatMap(([, mesh]) => mesh.userData.kinds ?? []);
-    const kinds = [...new Set([...there, ...this.section.kinds()])], now = [...kinds.sort(), "", ...this.#hidden].join();
+    const kinds = [...new Set([...there, ...this.section.kinds()])], now = [...kinds.sort(), "", ...kinds.filter((kind) => this.isSurface(kind)), "", ...this.awaited, "", ...this.#hidden].join();
     if (!this.#kinds.hear || now === this.#kinds.now) return;
     this.#kinds.now = now;
     this.#kinds.hear(kinds);
