@@ -171,7 +171,7 @@ function show({ command, result, kept, steps, held, seconds, printed, exit }) {
   if (exit !== null && command.startsWith("chamberopt new ")) return; // of the front page
   const before = study;
   study = exit === null && isStudy(command) ? result : "";
-  if (study && study !== before) tell("study", study);
+  if (study && study !== before) document.querySelector("[data-tab=run]").click(); // which shows it, also after a reload
   find("stop").disabled = exit !== null || isStoppedNow();
   find("stop-keeps").textContent = exit !== null ? "" : stopped ? STOPPING : `Stop ${keeps(command)[0]}`;
   if (exit !== null) sayStopped(0);

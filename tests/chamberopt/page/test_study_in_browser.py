@@ -133,3 +133,17 @@ def test_a_study_is_followed_and_a_candidate_taken(opened: Page, out: Path) -> N
     opened.tab("numbers")  # which is in the place of the study
     expect(page.locator("#study-view")).to_be_hidden()
     assert opened.errors == []
+
+
+def test_a_study_that_runs_is_seen_in_the_tab_run_after_a_reload(opened: Page) -> None:
+    page = opened.page
+    status = {"command": "chamberopt run study.toml", "result": "results/study", "kept": False}
+    status |= {"steps": [], "held": None, "seconds": 3, "printed": [], "exit": None}
+    page.route("**/status", lambda route: route.fulfill(json=status))
+    page.reload()
+    opened.wait("data-ready=yes")
+    expect(page.locator("#study-view")).to_be_visible()
+    expect(page.locator("nav [aria-selected=true]")).to_have_text("Run")
+    status["exit"] = 130
+    opened.wait("data-ended='130'")
+    page.unroute("**/status")
