@@ -4,7 +4,8 @@ THREE.ColorManagement.enabled = false; // a colour on the screen is the one of t
 const TEXT_HEIGHT = 0.0115; // over its distance: 2.2 % of the view's height
 const TEXT_PX = 15; // least height on the screen, so that a text is read in a small view too
 const OPACITY = { wall: 0.16, sonotrode: 0.9, block: 1 }; // of what is seen through, by kind; of a surface by its name
-const MARKED = 0.5; // opacity of what marks triangles, so that their own colour is seen
+const MARKED = 0.5, BEHIND = 0.15; // opacity of what marks triangles, so that their own colour is seen; where they are hidden
+const GREATER_DEPTH = 6; // THREE.GreaterDepth, which three.min.js leaves out: what is behind is drawn
 const EDGED = ["part", "remeshed"], MOST_EDGED = 200000; // whose sharp edges are drawn, and up to how many triangles
 const FROM_BELOW = 0.08; // opacity of the sonotrode before the part
 const WIDE = 0.7; // width over height of a view that shows all, also what is as wide as its diagonal
@@ -219,7 +220,7 @@ class View3D {
     marked.matrixWorldNeedsUpdate = true;
   }
 
-  // Mark triangles of a surface, also where they are hidden, or only where they are seen; null for none.
+  // Mark triangles of a surface, faintly also where they are hidden, or only where they are seen; null for none.
   highlight(name, triangles, colour, isThrough = true) {
     this.remove("highlight");
     const mesh = this.get(name);
@@ -229,8 +230,12 @@ class View3D {
     triangles.forEach((k, i) => own.set(index.subarray(3 * k, 3 * k + 3), 3 * i));
     const marked = this.surface("highlight", { points, triangles: own, opacity: MARKED });
     marked.material.color.set(colour);
-    Object.assign(marked.material, isThrough ? { depthTest: false } : { polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -4 });
+    Object.assign(marked.material, { polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -4 });
     marked.renderOrder = 1;
+    if (isThrough) {
+      const behind = new THREE.Mesh(marked.geometry, Object.assign(marked.material.clone(), { depthFunc: GREATER_DEPTH, opacity: BEHIND }));
+      marked.add(Object.assign(behind, { renderOrder: 1 }));
+    }
     marked.userData.of = name;
     this.#lay(name);
   }
