@@ -24,6 +24,7 @@ from chamberopt.chamber.layout.target import (
     find_surface,
     named_surfaces,
     names_within,
+    single_sizes,
     surfaces,
     why_unnamed,
 )
@@ -84,7 +85,8 @@ def surfaces_answer(mesh: PartMesh) -> bytes:
 
     `rows` are the names with their sizes in words. `face` is the number of the face of each
     triangle, and `names` has the name that a click on a face means. A fillet is a face of its own.
-    `unnamed` is why another face has no name, in words.
+    `sizes` has the size in words of each name of a row or a click. `unnamed` is why another face
+    has no name, in words.
     """
     if mesh.numbering.cad_face is not None:
         face = mesh.faces(None).of_triangle
@@ -92,9 +94,13 @@ def surfaces_answer(mesh: PartMesh) -> bytes:
         creased = mesh.faces(crease_deg(mesh)).of_triangle
         both = np.stack([creased, fillets_of(mesh).of_triangle], axis=1)
         face = np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
-    rows = [[one.name, one.text] for one in _surfaces(mesh)]
-    head = {"rows": rows, "names": face_names(mesh, face), "unnamed": why_unnamed(mesh)}
-    return packed(head, face=face)
+    known = _surfaces(mesh)
+    rows = [[one.name, one.text] for one in known]
+    sizes = dict(rows)
+    for one in known:
+        sizes |= single_sizes(mesh, one)
+    head = {"rows": rows, "sizes": sizes, "names": face_names(mesh, face)}
+    return packed(head | {"unnamed": why_unnamed(mesh)}, face=face)
 
 
 def picked_answer(mesh: PartMesh, picked: Sequence[Picked]) -> bytes:

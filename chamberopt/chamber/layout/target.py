@@ -396,6 +396,15 @@ def _single(mesh: PartMesh, of: Surface, number: int) -> Surface | None:
     )
 
 
+def single_sizes(mesh: PartMesh, of: Surface) -> dict[str, str]:
+    """Return the area in words of each of several faces that are alike, by its name."""
+    if not of.are_alike:
+        return {}
+    faces = mesh.faces(crease_deg(mesh))
+    own = np.unique(faces.of_triangle[of.triangles])
+    return {f"{of.name}.{k}": area_in_mm2(float(faces.area[one])) for k, one in enumerate(own, 1)}
+
+
 def names_within(mesh: PartMesh, of: Surface, triangles: Sequence[int]) -> list[str]:
     """Return the names of the faces of a surface in which some of its triangles are.
 

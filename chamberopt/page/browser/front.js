@@ -113,14 +113,21 @@ const shows = (named, name) => lights(named, view, () => ask("/face", { part: kn
 // What can be peened, ticked by name or by clicks on faces of the part; what is ticked is lit, until a chamber shows its target.
 let choosable = null; // number of each triangle's face, and the names of faces
 const MOST_LISTED = 12; // names that the file has not; a click takes others
-function box(name, text) {
-  const there = ticked().find((one) => one.value === name);
-  if (there) return there;
-  const made = element("input", { type: "checkbox", value: name });
-  made.addEventListener("change", () => attempt(lightTicked));
-  find("names").append(shows(element("label", {}, made, ` ${name}${text ? `: ${text}` : ""}`), name));
-  find("names").hidden = false;
+function box(name, text = choosable?.sizes[name]) {
+  const there = ticked().find((one) => one.value === name), made = there ?? element("input", { type: "checkbox", value: name });
+  if (!there) {
+    made.addEventListener("change", () => attempt(lightTicked));
+    find("names").append(shows(element("label", {}, made, element("span")), name));
+    find("names").hidden = false;
+  }
+  if (text) made.nextSibling.dataset.size = text;
+  made.nextSibling.textContent = [` ${name}`, made.nextSibling.dataset.size].filter(Boolean).join(": ");
   return made;
+}
+// Scroll the list of names, and not the page, to where one is seen.
+function scrollToBox(made) {
+  const list = find("names"), { offsetTop, offsetHeight } = made.parentElement;
+  list.scrollTop = Math.min(offsetTop, Math.max(list.scrollTop, offsetTop + offsetHeight - list.clientHeight));
 }
 async function findSurfaces(part, unit) {
   choosable = null;
@@ -129,6 +136,7 @@ async function findSurfaces(part, unit) {
   choosable = told;
   const named = new Set(ticked().map((one) => one.value));
   for (const [name, text] of told.rows.filter(([one]) => !named.has(one)).slice(0, MOST_LISTED)) box(name, text);
+  for (const one of ticked()) box(one.value); // those of before have their sizes now
   document.body.dataset.choosable = part;
 }
 const lit = new Map(); // triangles by part and name
@@ -138,12 +146,26 @@ async function lightTicked() {
   if (!view.get("walls")) view.highlight("part", names.length ? names.flatMap((name) => [...lit.get(key(name))]) : null, pointed);
 }
 find("names").addEventListener("pointerleave", () => { if (ticked().some((one) => one.checked)) attempt(lightTicked); });
+// The name of the face that a pointer event meets, "" for a face without one; null for none, or while the chamber is shown.
+function nameAt(event) {
+  const hit = choosable && !view.get("walls") ? view.at(event, ["part"]) : null;
+  return hit && (choosable.names[choosable.face[hit.triangle]] ?? "");
+}
+const noName = () => `this face cannot be chosen here, as ${choosable.unnamed}; the tab Target of an open design takes it by a click`;
+function tellOf(event) {
+  const name = event.buttons || view.tool ? null : nameAt(event), takes = ticked().some((one) => one.value === name && one.checked);
+  find("under").textContent = name === null ? "" : !name ? noName() : `${name}, ${choosable.sizes[name]}: a click ${takes ? "leaves it out" : "chooses it to be peened"}`;
+}
+view.renderer.domElement.addEventListener("pointermove", tellOf);
+view.renderer.domElement.addEventListener("pointerleave", () => { find("under").textContent = ""; });
 view.hearClicks((event) => attempt(async () => {
-  const hit = choosable && !view.get("walls") ? view.at(event, ["part"]) : null, name = hit && choosable.names[choosable.face[hit.triangle]];
-  if (hit && !name) throw new Error(`this face cannot be chosen here, as ${choosable.unnamed}; the tab Target of an open design takes it by a click`);
+  const name = nameAt(event);
+  if (name === "") throw new Error(noName());
   if (!name) return;
   const one = box(name);
   one.checked = !one.checked;
+  if (one.checked) scrollToBox(one);
+  tellOf({ clientX: event.clientX, clientY: event.clientY });
   await lightTicked();
 }));
 

@@ -86,7 +86,9 @@ def test_a_click_on_each_face_means_a_surface_that_can_be_peened(tmp_path: Path)
         assert [row[0] for row in head["rows"]] == [one.name for one in surfaces(mesh)]
         assert head["arrays"]["face"][1] == len(mesh.triangles)
         for name in set(head["names"].values()):
-            assert find_surface(mesh, surfaces(mesh), name).triangles.any()
+            found = find_surface(mesh, surfaces(mesh), name)
+            assert found.triangles.any()
+            assert head["sizes"][name] == found.text
 
 
 def test_a_surface_holds_whole_faces_of_a_cad_file() -> None:

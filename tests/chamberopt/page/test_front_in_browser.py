@@ -56,6 +56,8 @@ def test_a_part_dropped_on_the_front_page_becomes_an_open_design(tmp_path: Path)
             page.locator("#view").click()  # a face of the part, before anything is proposed
             picked = page.locator("#names input:checked")
             expect(picked).to_have_value(re.compile(r"face 1\.[1-6]"))
+            expect(picked.locator("..")).to_have_text(re.compile(r"face 1\.[1-6]: 256 mm²"))
+            expect(page.locator("#under")).to_contain_text("256 mm²: a click leaves it out")
             expect(page.locator("#view")).to_have_attribute("data-highlight", "2")  # triangles
             page.check("#names input[value='face 1']")
             expect(page.locator("#view")).to_have_attribute("data-highlight", "14")
