@@ -87,17 +87,21 @@ view.renderer.domElement.addEventListener("dblclick", () => { if (placed) lookAt
 // Number of the part's triangle below the pointer, or null.
 export function triangleAt(event) { return view.at(event, ["part"])?.triangle ?? null; }
 
-// Area [mm²] of triangles of the part, and whether they are flat or how far round they go: what a face is, in words.
-export function faceInWords(triangles, triangle, place) {
-  const mesh = view.get("part"), { normals } = Round.facets(mesh), first = normals[triangle], { index } = mesh.userData;
+// Gives what a face of the part is, by its triangles, at a place in one of them: { text, isOfPlace }. The text has its area [mm²],
+// and whether it is flat or how far round it goes.
+export function faceInWords(triangles) {
+  const mesh = view.get("part"), { normals } = Round.facets(mesh), first = normals[triangles[0]], { index } = mesh.userData;
   let area = 0;
   for (const k of triangles) {
     const [a, b, c] = [0, 1, 2].map((i) => Round.corner(mesh, index[3 * k + i]));
     area += b.sub(a).cross(c.sub(a)).length() / 2;
   }
-  const isFlat = triangles.every((k) => normals[k].dot(first) > Measure.PARALLEL), round = isFlat ? null : Round.of(mesh, triangle, place);
-  const bend = !round ? "curved" : round.isRough ? `curved, ${Measure.across(round)} here` : `round, ${Measure.across(round)}`;
-  return `${isFlat ? "flat" : bend}, ${short(area)} mm²`;
+  const isFlat = triangles.every((k) => normals[k].dot(first) > Measure.PARALLEL);
+  return (triangle, place) => {
+    const round = isFlat ? null : Round.of(mesh, triangle, place), isOfPlace = !isFlat && (round?.isRough ?? true);
+    const bend = !round ? "curved" : round.isRough ? `curved, ${Measure.across(round)} here` : `round, ${Measure.across(round)}`;
+    return { text: `${isFlat ? "flat" : bend}, ${short(area)} mm²`, isOfPlace };
+  };
 }
 
 let toldOfFace = null; // gives words on the face that is met, and on what a click does with it

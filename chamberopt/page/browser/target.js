@@ -134,16 +134,18 @@ function light(event) {
 }
 view.renderer.domElement.addEventListener("pointermove", light);
 view.renderer.domElement.addEventListener("pointerleave", () => light(null));
-// What the face under the pointer is, as a name and words, and what a click does with it. The face that was told of last is kept.
+// What the face under the pointer is, as a name and words, and what a click does with it. The face that was told of last is kept,
+// its words too unless they are of the place alone.
 let told = { of: null };
 tellOfFace(({ triangle, place }, kind) => {
   const of = faces();
   if (of && (told.of !== of || told.face !== of[triangle])) {
     const own = [];
     of.forEach((one, k) => { if (one === of[triangle]) own.push(k); });
-    told = { of, face: of[triangle], words: faceInWords(own, triangle, place) };
-  }
-  return [of ? [creased.names?.[told.face], told.words].filter(Boolean).join(", ") : "", whatAClickDoes(["target", "unreached", "outside"].includes(kind))];
+    told = { of, face: of[triangle], triangle, inWords: faceInWords(own) };
+    told.words = told.inWords(triangle, place);
+  } else if (of && told.triangle !== triangle && told.words.isOfPlace) Object.assign(told, { triangle, words: told.inWords(triangle, place) });
+  return [of ? [creased.names?.[told.face], told.words.text].filter(Boolean).join(", ") : "", whatAClickDoes(["target", "unreached", "outside"].includes(kind))];
 });
 function whatAClickDoes(isTarget) {
   if (isFaceDown()) return "a click turns it down";
