@@ -33,10 +33,12 @@ from chamberopt.pictures.drawing.walls import draw_walls
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from shapely.geometry.base import BaseGeometry
 
     from chamberopt.chamber.build import Chamber
     from chamberopt.chamber.checks.openings import Opening
     from chamberopt.design.fixture import OpeningCut
+    from chamberopt.pictures.drawing.dimensions import Point
 
 WIDER = 0.1  # mm: a cavity that is wider than its sonotrode by more has its own dimension
 BEYOND = 0.1  # mm on paper that a part goes on at least where it is broken off
@@ -54,7 +56,9 @@ PRESSED = 0.9  # cosine from which on jaws press along an axis
 FIRST_ROW, ROWS = 4.0, 4.2
 CROSS = 4.0  # mm on paper, of the lines that cross in the middle of an opening
 MOST_CENTRES = 1  # heights of openings on each side of a section
-LETTER = 1.0  # mm on paper, width of a letter of a name of a holder
+# mm on paper, of a name of a holder: width of a letter, height of a line, room beside it, and
+# between it and the walls
+LETTER, LINE, BESIDE_NAME, EDGE = 1.0, 2.2, 1.0, 0.5
 # mm on paper, from the part to the dimension of the opening above it, and what that takes more
 # where its text stands above its line
 OPENING, ABOVE_LINE = 3.0, 1.2
@@ -97,14 +101,14 @@ def draw_section(
     draw_lines(axes, view, lines[tags == TAG_WALL], BLACK, 1.1)
     draw_lines(axes, view, lines[tags > TAG_WALL], SONOTRODE, 2.5)
     draw_lines(axes, view, lines[target], BLUE, 2.0)
-    _draw_fixtures(axes, chamber, view, 1e-3 * at)
+    named = _draw_fixtures(axes, chamber, view, 1e-3 * at, inside(1e3 * lines))
     (axis_at, y), (_, top) = view.place([[0.0, 0.0], [0.0, view.high[1]]])
     *sides, above = np.maximum(view.outside, WALL).tolist()
     above += float(top)
     across_line(axes, (axis_at, y - FACE - 1.0), (axis_at, above + 1.0))
     words = f"{name}–{name}: {'xy'[view.right]} to the right, z up"
     dimensioned = _draw_ceiling(axes, chamber, view, above, opening)
-    label(axes, view.corner[0], above + 2.5 + dimensioned, words)
+    label(axes, view.corner[0], max(above + 2.5 + dimensioned, named + BESIDE_NAME), words)
     # The sonotrode is a band below its mean face, at z = 0.
     face_wide = 0.0
     face = 1e3 * lines[tags == TAG_SONOTRODE][..., 0]
@@ -322,36 +326,68 @@ def _crossings(ends: np.ndarray, axis: int, place: float, beyond: float = 0.0) -
     return np.sort((one + share[:, None] * (two - one))[:, 1 - axis])
 
 
-def _draw_fixtures(axes: Axes, chamber: Chamber, view: View, at: float) -> None:
+def _draw_fixtures(
+    axes: Axes, chamber: Chamber, view: View, at: float, room: BaseGeometry
+) -> float:
     """Draw holder and mask in the section, each with its name and size.
+
+    Return the height on the page up to which names stand above the room [mm]; 0 if none does.
 
     Args:
         at: place of the section's plane [m].
+        room: what is left for the shot in the section [mm of the chamber].
     """
-    import shapely
-
-    window = view.window(axes)
+    window, top = view.window(axes), 0.0
     for name, one in chamber.fixtures.items():
         lines, _ = cut(one.vertices, one.triangles, 1 - view.right, at)
         look: Any = {"facecolor": FIXTURE_COLOURS[name], "edgecolor": BLACK, "lw": 0.7}
         area = inside(1e3 * lines)
         fill(axes, view, area, window, hatch="....", **look)
         if len(lines):
-            (left, low), (right, high) = view.place(
-                1e3 * np.array([lines.min(axis=(0, 1)), lines.max(axis=(0, 1))])
-            )
-            middle = 0.5 * (left + right), 0.5 * (low + high)
             size = size_in_words(one.kind, [1e3 * side for side in one.size], unit="")
             text = f"{name}\n{size}".strip()
-            style: Any = {"size": 5.0, "bbox": LABEL}
-            in_body = area.contains(shapely.Point(view.chamber_point(middle)))
-            wide = LETTER * max(map(len, text.split("\n")))
-            walls = view.place([view.low, view.high])[:, 0]
-            if in_body and right - left > max(SHORT, wide):
-                x, y, look = middle[0], middle[1], {"ha": "center", "va": "center"}
-            elif right + 1.0 + wide < walls[1] or left > walls[1]:
-                x, y, look = right + 1.0, middle[1], {"ha": "left", "va": "center"}
-            else:  # beside it a wall would be behind the name
-                x, y = min(middle[0], walls[1] - 0.5 * wide - 0.5), high + 0.6
-                look = {"ha": "center", "va": "bottom"}
-            axes.text(x, y, text, **look, **style)
+            place, is_above = _place_of_name(view, text, area, room)
+            axes.text(*place, text, size=5.0, bbox=LABEL, ha="center", va="center")
+            if is_above:
+                top = max(top, place[1] + 0.5 * _size_of_name(text)[1])
+    return top
+
+
+def _size_of_name(text: str) -> Point:
+    """Return width and height of a name of a holder or mask on the page [mm]."""
+    rows = text.split("\n")
+    return LETTER * max(map(len, rows)), LINE * len(rows)
+
+
+def _place_of_name(
+    view: View, text: str, area: BaseGeometry, room: BaseGeometry
+) -> tuple[Point, bool]:
+    """Return the middle of the name of a holder or mask on the page [mm].
+
+    It is on the body, or near it in the room, where nothing else is. If there is no such place, it
+    is above the body, whatever is there, and the second value is true.
+
+    Args:
+        area, room: what the body takes of the section, and what the shot does [mm of the chamber].
+    """
+    import shapely
+
+    wide, tall = _size_of_name(text)
+    left, low, right, high = view.place(np.reshape(area.bounds, (2, 2))).ravel().tolist()
+    x, y = 0.5 * (left + right), 0.5 * (low + high)
+    if right - left > max(SHORT, wide) and area.contains(shapely.Point(view.chamber_point((x, y)))):
+        return (x, y), False
+    before, behind = left - 0.5 * wide - BESIDE_NAME, right + 0.5 * wide + BESIDE_NAME
+    under, over = low - 0.5 * tall - BESIDE_NAME, high + 0.5 * tall + BESIDE_NAME
+    ends = right - 0.5 * wide - EDGE, left + 0.5 * wide + EDGE
+    places = [(behind, y), (before, y), *((one, z) for z in (under, over) for one in ends)]
+    for place in places:
+        corners = [
+            view.chamber_point((place[0] + k * 0.5 * wide, place[1] + k * 0.5 * tall))
+            for k in (-1.0, 1.0)
+        ]
+        if room.contains(shapely.box(*corners[0], *corners[1])):
+            return place, False
+    walls = view.place([view.low, view.high])[:, 0]
+    above = high + WALL + EDGE + 0.5 * tall
+    return (min(x, walls[1] - 0.5 * wide - EDGE), above), True

@@ -19,6 +19,8 @@ from chamberopt.pictures.drawing.cuts import _hides_way_out, section_planes
 from chamberopt.pictures.drawing.dimensions import Limits
 from chamberopt.pictures.drawing.section import JAWS
 from chamberopt.pictures.drawing.walls import LID, WALLS
+from chamberopt.printers.sheet_page import HEIGHT, MARGIN, WIDTH
+from tests.helpers.drawings import boxes_of, require_apart
 from tests.helpers.synthetic import plate_design
 
 ROOM = {"shape": "box", "length_mm": 40, "width_mm": 30, "height_mm": 30}
@@ -115,7 +117,33 @@ def test_no_wall_is_behind_the_name_of_a_short_holder(tmp_path: Path) -> None:
     chamber = room_with(cube, tmp_path, (9.0, 0.0), **held)
     draw_chamber(axes, chamber, 0.0, 70.0, (190.0, 70.0))
     (name,) = (one for one in axes.texts if one.get_text().startswith("holder"))
-    assert (name.get_ha(), name.get_va()) == ("center", "bottom")
+    (rod,) = (one for one in axes.patches if one.get_hatch() == "....")
+    (left, low), (right, high) = rod.get_path().get_extents().get_points()
+    x, y = name.get_position()
+    assert not low - 2.0 < y < high + 2.0  # two lines of 5 pt
+    assert left < x < right - 3.0
+
+
+@pytest.mark.parametrize(("wide", "is_below"), [(10.0, True), (36.0, False)])
+def test_the_name_of_a_holder_leaves_the_name_of_the_section_alone(
+    tmp_path: Path, wide: float, is_below: bool
+) -> None:
+    """A plate in the ceiling of a room of 40 mm, round a post, or round a block as wide as itself.
+
+    Behind its middle is the part. Under it the name has room beside the post, not beside the block.
+    """
+    plate = {"kind": "plate", "size_mm": (37.0, 28.0), "axis": (0.0, 0.0, 1.0), "grip_mm": 6.0}
+    part = trimesh.creation.box((wide, 10.0, 18.0))
+    chamber = room_with(part, tmp_path, (0.0, 0.0), holder=plate)
+    figure = Figure(figsize=(WIDTH / 25.4, HEIGHT / 25.4))
+    axes = figure.add_axes((0, 0, 1, 1), xlim=(0, WIDTH), ylim=(0, HEIGHT))
+    draw_chamber(axes, chamber, MARGIN, 200.0, (180.0, 70.0))
+    boxes = boxes_of(figure)
+    require_apart(boxes)
+    (name,) = (box for text, box in boxes if text.startswith("holder"))
+    (section_name,) = (box for text, box in boxes if text.startswith("A–A"))
+    assert max(name[3], section_name[3]) < 200.0 / 25.4 * 72.0
+    assert (name[3] < section_name[1] - 30.0) == is_below
 
 
 def test_a_part_is_broken_off_before_a_hole_beyond_the_chamber(tmp_path: Path) -> None:
