@@ -29,6 +29,7 @@ CONFIDENCE = 0.95
 FIRST_OF_CALIBRATION = 16
 ZERO_TOLERANCE = 1e-12  # a smaller value is a rounding error of zero
 NOT_RESOLVED = "not resolved"  # words in place of a number that has too few dents
+NOT_PROVEN = "not proven: simulate longer"  # words behind a number that has too few dents
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ import numpy as np
 
 from chamberopt.common import toml_errors
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import NOT_RESOLVED
 from chamberopt.common.key_words import inner_first
 from chamberopt.design.flexure import NO_STRESS
 
@@ -267,6 +268,12 @@ def find_metric(name: str) -> Metric | None:
         of_zone = of_target.replace("the target", f"zone {surface}")
         summary = of_zone if of_zone != of_target else f"{of_target}, zone {surface}"
     return replace(metric, name=name, summary=summary, required=False)
+
+
+def tells_coverage(metrics: Mapping[str, Estimate]) -> bool:
+    """Return whether enough dents were simulated to tell the coverage after the treatment time."""
+    mean = metrics.get("mean_coverage")
+    return mean is None or mean.in_words != NOT_RESOLVED
 
 
 def named(name: str) -> str:

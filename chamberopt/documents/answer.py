@@ -10,6 +10,7 @@ from chamberopt.chamber.checks.calibration import misfit_texts
 from chamberopt.common.errors import one_line
 from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.number_text import percent
+from chamberopt.coverage.metrics import tells_coverage
 from chamberopt.documents.coverage import change, is_bound
 from chamberopt.documents.document import AnswerLine
 from chamberopt.documents.ranges import range_answer
@@ -52,7 +53,7 @@ def answer(result: Result, start: Result | None, tells_aim: bool = True) -> str:
     if start is None:
         mean = metric_label("mean_coverage")
         treatment_time = result.design.process.treatment_time
-        if result.metrics["mean_coverage"].in_words == NOT_RESOLVED:
+        if not tells_coverage(result.metrics):
             share = result.record.field.reachable_share
             only = f"Balls get to {share:.0%} of the target. " if share < MOSTLY else ""
             return (
@@ -116,7 +117,7 @@ def stopped_text(result: Result) -> str:
 def on_average(result: Result) -> str:
     """Return a line on a result: the time to 98 %, and the mean coverage."""
     mean = result.metrics["mean_coverage"]
-    if mean.in_words == NOT_RESOLVED:
+    if not tells_coverage(result.metrics):
         return f"{full_coverage(result)}; its mean coverage is not resolved"
     if is_bound(mean):
         return f"{full_coverage(result)}; {_least_covered(result)}"

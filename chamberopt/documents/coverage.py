@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from chamberopt.common.estimate import (
+    NOT_PROVEN,
     NOT_RESOLVED,
     Estimate,
     independent_difference,
@@ -208,8 +209,10 @@ def coverage_section(
     }
     is_flat = all(scene.is_saturated for scene in scenes.values())
     if is_flat:
-        text = "All of it would be one bar of a histogram, from 95 to 100 %. "
-        content.append(Sentence(text + TELLS_APART, "soft"))
+        text = "All of it would be one bar of a histogram, from 95 to 100 %"
+        told = all(scene.tells_coverage for scene in scenes.values())
+        text += f". {TELLS_APART}" if told else f", {NOT_PROVEN}."
+        content.append(Sentence(text, "soft"))
     elif drawn:
         caption = (
             "How much of the target's area has which coverage at the end of the treatment, "

@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 
 from chamberopt.chamber.bores_and_deflectors import on_deflectors
+from chamberopt.common.estimate import NOT_PROVEN
+from chamberopt.coverage.metrics import tells_coverage
 from chamberopt.design.shape_surface import TAG_PART, TAG_WALL, is_sonotrode
 from chamberopt.design.sonotrode import Face
 from chamberopt.geometry.sight import way_to_see
@@ -46,6 +48,7 @@ class PartScene:
             there are too few simulated dents to tell points apart.
         area: area of the surface around each point [mm²], shape (k,).
         is_saturated: whether nearly all of the target is covered to 95 % or more.
+        tells_coverage: whether there are enough simulated dents to tell the coverage.
     """
 
     data: dict[str, Any] | None
@@ -53,6 +56,7 @@ class PartScene:
     coverage: np.ndarray | None
     area: np.ndarray
     is_saturated: bool = False
+    tells_coverage: bool = True
 
 
 def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -> PartScene:
@@ -72,7 +76,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
     area = point_areas(whole)
     limits = colour_range([part])
     is_saturated = limits[0] >= SATURATED
-    remarks = []
+    is_told, remarks = tells_coverage(result.metrics), []
     count = whole.n_cells
     too_many = f"triangles, more than the {max_triangles:,} that a page"
     if count > max_triangles:
@@ -80,7 +84,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
             f"The target is drawn with {count:,} {too_many} can draw, so there is no picture here; "
             "chamberopt inspect shows it."
         )
-        return PartScene(None, tuple(remarks), coverage, area, is_saturated)
+        return PartScene(None, tuple(remarks), coverage, area, is_saturated, is_told)
     rest = part.rest
     if count + rest.n_cells > max_triangles:
         remarks.append(
@@ -109,6 +113,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         "title": title,
         "limits": limits,  # of coverage after the treatment time, as in pictures
         "treatment": treatment,
+        "doubt": "" if is_told else f", {NOT_PROVEN}",  # behind coverage at a place, and its time
         # After the treatment time as all say it; the curve takes fewer points.
         "mean": [mean.value, mean.half_width] if math.isfinite(mean.half_width) else [],
         "curve": [
@@ -146,7 +151,7 @@ def part_scene(result: Result, title: str, max_triangles: int = MAX_TRIANGLES) -
         "edges": {"ends": _packed(_edges(chamber, np.asarray(chamber["tag"]))), "colour": EDGES},
         "view": _view(chamber, part, eye),
     }
-    return PartScene(data, tuple(remarks), coverage, area, is_saturated)
+    return PartScene(data, tuple(remarks), coverage, area, is_saturated, is_told)
 
 
 def quantities_in_all(scenes: Sequence[dict[str, Any]]) -> list[dict[str, str]]:

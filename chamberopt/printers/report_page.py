@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import NOT_PROVEN
 from chamberopt.common.files import claim_file, read_file, require_place, write_text
 from chamberopt.documents.coverage import TELLS_APART, summary
 from chamberopt.documents.document import Document, Items, PartView, Section
@@ -32,6 +33,10 @@ SCRIPTS = "three/three.min.js", *VIEW, "part.js"
 WHY_TIME = (
     "A map of coverage would be of one colour, 95 % and more, wherever dents suffice to tell it, "
     "so the picture begins with another quantity."
+)
+IN_DOUBT = (
+    f"After the treatment time the coverage is about full, {NOT_PROVEN}. The picture begins with "
+    "the time to 98 %, which is not proven either."
 )
 HELP = (
     "Drag to turn, use the wheel to zoom after a click or with Ctrl, point at the target to see "
@@ -200,7 +205,9 @@ def viewer(scenes: Sequence[PartScene]) -> str:
         time for one in drawn for time in (one["treatment"], *(row[0] for row in one["curve"]))
     )
     now = min(one["treatment"] for one in drawn)  # after which all are known
-    why = html.paragraph(f"{WHY_TIME} {TELLS_APART}", "soft") if saturated else ""
+    told = all(scene.tells_coverage for scene in scenes)
+    text = f"{WHY_TIME} {TELLS_APART}" if told else IN_DOUBT
+    why = html.paragraph(text, "soft") if saturated else ""
     panels = ""
     for i, one in enumerate(drawn):
         title = html.text(one["title"])

@@ -23,8 +23,10 @@ from chamberopt.chamber.fixture import plugs_of
 from chamberopt.chamber.layout.grip import outside_clamp
 from chamberopt.chamber.layout.screws import holes_for_screws
 from chamberopt.common.errors import InputError
+from chamberopt.common.estimate import NOT_PROVEN
 from chamberopt.common.files import claim_file, private_folder, write_bytes
 from chamberopt.common.number_text import held_together
+from chamberopt.coverage.metrics import tells_coverage
 from chamberopt.documents.document import Block, Document, Section, Sentence, Table
 from chamberopt.documents.sheet import (
     AsBuilt,
@@ -92,6 +94,7 @@ COVERAGE = (
     "Share of the surface that is dented after the treatment time, simulated, in windows round "
     "each place. Numbers: where to look, see Acceptance, also for one that no view shows."
 )
+NOT_TOLD = f"How much of it is dented after the treatment time is {NOT_PROVEN}."
 COLUMNS = (88.0, 62.0, 36.0)  # mm, of a table with a head
 MM_PER_PT = 25.4 / 72.0
 LEADING = 1.25  # height of a line over the size of its letters
@@ -333,6 +336,7 @@ def write_sheet(
             Shown(limits, design.sonotrode.face, cut_of(loaded), held),
             outlines,
             coverage_map(loaded.folder, 3 if outlines else VIEWS_A_ROW, places),
+            "" if tells_coverage(loaded.metrics) else NOT_TOLD,
         )
         _save(path, pages, sheet.name)
     return path, sheet
@@ -362,6 +366,7 @@ def draw_sheet(
     shown_beside: Shown = NOTHING_BESIDE,
     openings: Sequence[tuple[str, Opening]] = (),
     coverage: np.ndarray | str | None = None,
+    doubt: str = "",
 ) -> list[Figure]:
     """Return a process sheet as figures of its pages.
 
@@ -376,6 +381,7 @@ def draw_sheet(
         shown_beside: what drawings show beside the chamber.
         openings: those that are cut along the part's section, each with its words.
         coverage: picture of the coverage, red, green and blue of each pixel, or why there is none.
+        doubt: a sentence above that picture on what is not told of the coverage.
     """
     ignore_settings_here()
     first, further, block = sheet.sections
@@ -412,7 +418,7 @@ def draw_sheet(
     pages += _further_steps(chamber, sheet.name, shown_beside)
     y = 0.0
     if isinstance(coverage, np.ndarray):
-        last, y = _coverage_page(coverage, sheet.name, under)
+        last, y = _coverage_page(coverage, f"{doubt} {COVERAGE}".strip(), sheet.name, under)
         pages += [last] * (last not in pages)
     if openings:
         if y - FOOT < LEAST_OPENINGS:
@@ -570,13 +576,14 @@ def _further_steps(chamber: Chamber, name: str, beside: Shown) -> Iterator[Axes]
 
 
 def _coverage_page(
-    picture: np.ndarray, name: str, under: tuple[Axes, float] | None = None
+    picture: np.ndarray, text: str, name: str, under: tuple[Axes, float] | None = None
 ) -> tuple[Axes, float]:
     """Return a page with the picture of the coverage, and the height of its bottom [mm].
 
     It is as wide as the page if it is low enough.
 
     Args:
+        text: what stands above it.
         under: a page and the height of its bottom [mm], to which it goes if that has room for it.
     """
     title, (rows, columns) = "Coverage by place", picture.shape[:2]
@@ -585,7 +592,7 @@ def _coverage_page(
         y = Writer(axes, 12.0).write(title, MARGIN, y - 2.0, INNER, bold=True) - 3.0
     else:
         axes, y = _further_page(title, name)
-    y = Writer(axes, 7.0).write(COVERAGE, MARGIN, y, INNER) - 3.0
+    y = Writer(axes, 7.0).write(text, MARGIN, y, INNER) - 3.0
     size = np.array([columns, rows]) * min(INNER / columns, (y - FOOT) / rows)
     axes.imshow(picture, extent=(MARGIN, MARGIN + size[0], y - size[1], y), interpolation="none")
     axes.set(xlim=(0.0, WIDTH), ylim=(0.0, HEIGHT), aspect="auto")

@@ -11,8 +11,9 @@ import numpy as np
 from chamberopt.chamber.checks.fillets import OF_FILLET
 from chamberopt.chamber.checks.place_names import CEILING
 from chamberopt.chamber.propose.proposed_budget import UNEVEN
+from chamberopt.common.estimate import NOT_PROVEN
 from chamberopt.common.number_text import rounded
-from chamberopt.coverage.metrics import FULL_COVERAGE
+from chamberopt.coverage.metrics import FULL_COVERAGE, tells_coverage
 from chamberopt.design.almen_strip import STRIPS
 from chamberopt.documents.sheet.rows import AsBuilt, Row
 from chamberopt.documents.wanted import (
@@ -167,12 +168,14 @@ def _first_part(result: Result, built: AsBuilt) -> str:
     """Return in words after which time to stop the first part, and what to see there by then.
 
     It is half of the time to 98 %, where shares still tell a slow machine from a quick one, and no
-    longer than the part is to be peened. The text is empty where hardly a dent is seen by then, or
-    the part is peened in several steps.
+    longer than the part is to be peened, nor than the coverage is told. The text is empty where
+    hardly a dent is seen by then, or the part is peened in several steps.
     """
     planned, time = result.design.process.treatment_time, result.metrics.get(TIME)
     half = 0.5 * (planned if time is None or not time.has_number else time.value)
-    after = min(half, planned)
+    is_told, curve = tells_coverage(result.metrics), result.record.coverage_against_time
+    last = planned if is_told else max((row.time_s for row in curve), default=0.0)
+    after = min(half, planned, last)
     what = "half of the time to 98 %" if after == half and half != 0.5 * planned else ""
     shares = [one.coverage(after / planned) for one in built.places]
     if result.design.steps or max(shares) < LEAST_SEEN:
@@ -187,10 +190,12 @@ def _first_part(result: Result, built: AsBuilt) -> str:
             for one, end in ((built.places[0], x) for x in (ends.low.value, ends.high.value))
         )
         more = f" ({rounded(low, 2)} to {rounded(high, 2)} % at 1 before calibration)"
+    doubt = "" if is_told else f"; on how much of them after {plain(planned)} s is {NOT_PROVEN}"
     return (
         f"stop it after {plain(after, 2)} s{f', {what},' if what else ''} and look: dents are "
-        f"expected on about {told}{more}. Where fewer are seen, the machine peens more slowly than "
-        "was simulated: peen on, twice as long each time, until no more dents are seen, and set "
+        f"expected on about {told}{more}{doubt}. Where fewer are seen, the machine peens more "
+        "slowly than was simulated: peen on, twice as long each time, until no more dents are "
+        "seen, and set "
         f"{multiple_in_words(result.design)}that time{_why_longer(result)}."
     )
 

@@ -7,6 +7,7 @@ function showParts({ quantities, scenes, scales, kinds }) {
   const label = find("label");
   const CARD = ["coverage", "time-98", "impacts", "speed"]; // beside the pointer; all numbers are in the list of kept places
   const FIRST = ["coverage", "interval", "speed", "impacts", "angle", "time-98"]; // of a kept place; the others are folded
+  const DOUBTED = ["coverage", "interval", "time-98"]; // told with a doubt where too few dents were simulated
   const SOLID = ["part", "few", "unreached", "rest"];
 
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
@@ -134,7 +135,7 @@ function showParts({ quantities, scenes, scales, kinds }) {
     for (const one of quantities) {
       const now = one.name === "coverage";
       const value = now ? covered(scene.columns.density[k], scene) : scene.columns[one.name][k];
-      const row = [now ? `coverage after ${number(seconds())} s` : one.label, `${number(value)} ${one.unit}`];
+      const row = [now ? `coverage after ${number(seconds())} s` : one.label, `${number(value)} ${one.unit}${DOUBTED.includes(one.name) ? scene.doubt : ""}`];
       if (CARD.includes(one.name) || one === chosen()) shown.push(row);
       if (FIRST.includes(one.name)) first[FIRST.indexOf(one.name)] = row; else others.push(row);
     }

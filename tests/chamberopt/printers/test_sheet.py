@@ -492,6 +492,19 @@ def test_a_part_is_accepted_by_places_shares_and_strips(folder: Path) -> None:
     result.metrics.update(almen_intensity=Estimate(0.2, 0.01))
     assert "no whole strip is held" in dict(acceptance_rows(result, built))["intensity"]
     assert dict(acceptance_rows(result, wide))["intensity"].endswith("the times of Measure first")
+    # Where the coverage is not told, shares are told for a time up to which it is.
+    mean = result.metrics["mean_coverage"].not_known("not resolved")
+    few = {**result.record.metrics, "mean_coverage": mean}
+    curve = result.record.coverage_against_time
+    early = [one for one in curve if one.time_s < 0.8 * half]
+    assert 0 < len(early) < len(curve)
+    for kept, until in ((early, early[-1].time_s), ([], 0.0)):
+        record = result.record.model_copy(update={"coverage_against_time": kept, "metrics": few})
+        told = dict(acceptance_rows(replace(result, record=record), built)).get("first part", "")
+        share = per_cent(places[0].coverage(until / 5.0))
+        assert told.startswith(f"stop it after {plain(until, 2)} s") == bool(kept)
+        assert (f"on about {share} at 1" in told) == bool(kept)
+        assert ("after 5 s is not proven: simulate longer" in told) == bool(kept)
     none = dict(acceptance_rows(result, AsBuilt((50.0,))))
     assert none["places to look at"].startswith("all of the target")
     assert "first part" not in none
