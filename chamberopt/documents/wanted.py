@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.number_text import estimate_text
+from chamberopt.coverage.metrics import tells_coverage
 from chamberopt.design.intensity import (
     OUTSIDE,
     TOO_FEW,
@@ -196,16 +197,28 @@ def _is_unresolved(metrics: Mapping[str, Estimate]) -> bool:
     return strength is not None and strength.in_words == NOT_RESOLVED
 
 
+def not_told(metrics: Mapping[str, Estimate]) -> list[str]:
+    """Return what too few dents were simulated to tell, in words."""
+    time = metrics.get(TIME)
+    is_unknown = {
+        "the coverage": not tells_coverage(metrics),
+        "the time to 98 %": time is not None and time.in_words == NOT_RESOLVED,
+        "the peening strength": _is_unresolved(metrics),
+    }
+    return [name for name, is_so in is_unknown.items() if is_so]
+
+
 def times_longer(result: Result) -> int:
-    """Return how many times the simulated time tells the peening strength; 1 if it is told.
+    """Return how many times the simulated time tells what is not told; 1 if nothing is missing.
 
     Where the dents are enough for all but the strength, twice the time is a start, as the time
     that it needs is not known.
     """
-    if not _is_unresolved(result.metrics):
+    if not not_told(result.metrics):
         return 1
-    needed = result.record.field.simulated_s_needed.p05_times_intensity or 0.0
-    return max(2, math.ceil(needed / result.record.simulated_time_s))
+    needed, is_told = result.record.field.simulated_s_needed, tells_coverage(result.metrics)
+    of_all = max(needed.p05_times_intensity or 0.0, 0.0 if is_told else needed.mean_and_std or 0.0)
+    return max(2, math.ceil(of_all / result.record.simulated_time_s))
 
 
 def wanted_rows(result: Result) -> Iterator[tuple[str, str]]:

@@ -39,7 +39,7 @@ from chamberopt.documents.overview import comparison_overview
 from chamberopt.documents.proposal import as_sentence
 from chamberopt.documents.report import answer_section, notes_section
 from chamberopt.documents.study import aim_in_words
-from chamberopt.documents.wanted import times_longer
+from chamberopt.documents.wanted import not_told, times_longer
 from chamberopt.documents.wording import metric_label, named_value
 from chamberopt.geometry.faces import Border
 from chamberopt.page.answers import (
@@ -180,7 +180,7 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
 
     What is answered stands beside the view, and its figures below.
 
-    Where one does not tell the peening strength, `longer` has how many times as long a simulation
+    Where one does not tell a figure, `longer` names it, and has how many times as long a simulation
     tells it, and this time as values of the design.
 
     Raises:
@@ -207,7 +207,11 @@ def shown(folders: Sequence[Path]) -> dict[str, object]:
         ]
         if (times := times_longer(result)) > 1:
             now = result.design.process.accuracy.simulated_time_s
-            longer = {"times": times, "values": {SIMULATED_TIME: float(f"{times * now:.4g}")}}
+            longer = {
+                "times": times,
+                "values": {SIMULATED_TIME: float(f"{times * now:.4g}")},
+                "tells": ", ".join(not_told(result.metrics)),
+            }
     sentences = [one for one in first.content if isinstance(one, Sentence)]
     answers = [one for one in sentences if one.kind in ANSWERS or one.about == "process"]
     figures = [one for one in first.content if one not in answers]

@@ -93,9 +93,9 @@ async function show() {
 }
 
 // A button that makes the simulated time of the design longer, and leads to where it is simulated.
-function simulateLonger({ times, values }) {
+function simulateLonger({ times, values, tells }) {
   const [seconds] = Object.values(values);
-  const longer = button(`Simulate ${times} times as long, to tell the peening strength`, () => {
+  const longer = button(`Simulate ${times} times as long, to tell ${tells}`, () => {
     change(values);
     document.querySelector("[data-tab=run]").click();
     say(`Each replica is ${seconds} s long now, ${times} times the time of this result: simulate the design again.`, true);

@@ -11,6 +11,7 @@ from chamberopt.documents.wanted import (
     coverage_standing,
     enough_time,
     intensity_lines,
+    not_told,
     time_lines,
     time_text,
     times_longer,
@@ -156,11 +157,18 @@ def test_an_intensity_that_is_not_known_has_its_remedy() -> None:
 
 
 @pytest.mark.parametrize(("needed", "times"), [(35.0, 4), (5.0, 2), (None, 2)])
-def test_the_time_that_tells_the_strength(needed: float | None, times: int) -> None:
+def test_the_time_that_tells_what_is_not_told(needed: float | None, times: int) -> None:
     """Of a simulation of 10 s, after which the places of the part are told or not."""
-    field = SimpleNamespace(simulated_s_needed=SimpleNamespace(p05_times_intensity=needed))
+    times_needed = SimpleNamespace(p05_times_intensity=needed, mean_and_std=52.0)
+    field = SimpleNamespace(simulated_s_needed=times_needed)
     record = SimpleNamespace(field=field, simulated_time_s=10.0)
     result: Any = SimpleNamespace(metrics=UNKNOWN, record=record)
     assert times_longer(result) == times
-    result.metrics = {"strength_um": Estimate(13.0, 0.2)}
+    assert not_told(result.metrics) == ["the peening strength"]
+    few = Estimate(0.9, 0.1).not_known("not resolved")
+    result.metrics = {**UNKNOWN, "mean_coverage": few, "time_to_98_s": few}
+    assert times_longer(result) == 6
+    assert not_told(result.metrics) == ["the coverage", "the time to 98 %", "the peening strength"]
+    result.metrics = {"strength_um": Estimate(13.0, 0.2), "mean_coverage": Estimate(0.9, 0.1)}
     assert times_longer(result) == 1
+    assert not_told(result.metrics) == []
