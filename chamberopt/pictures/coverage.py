@@ -11,7 +11,7 @@ import numpy as np
 from chamberopt.pictures.actors import SCATTER, add_edges, add_part, body_meanings, colour_meanings
 from chamberopt.pictures.camera import target_in_chamber
 from chamberopt.pictures.drawn_part import DrawnPart, beyond, colour_range
-from chamberopt.pictures.panels import choose_views, part_panels, seen_marks
+from chamberopt.pictures.panels import choose_views, part_panels, with_marks
 from chamberopt.pictures.picture_page import ColourBar, Row, write_page
 from chamberopt.pictures.subprocess_drawing import draw_in_subprocess
 from chamberopt.results.arrays_file import ARRAYS_FILE, read_result_arrays
@@ -75,10 +75,8 @@ def render_coverage(job: dict[str, Any]) -> None:
 
         marks = [(str(k), np.reshape(one, (1, 6))) for k, one in enumerate(job["marks"], 1)]
         surfaces = part.inside, part.surface, one.cavity
-        panels = [
-            panel._replace(marks=seen_marks(marks, part.surface, panel.view))
-            for panel in part_panels(add, *surfaces, views, has_plugs, job["finer"])
-        ]
+        panels = part_panels(add, *surfaces, views, has_plugs, job["finer"])
+        panels = with_marks(panels, marks, part.surface, one.cavity)
         for first in range(0, len(panels), job["columns"]):
             shown = panels[first : first + job["columns"]]
             rows.append(Row("" if first else title, shown))

@@ -22,7 +22,7 @@ from chamberopt.pictures.camera import (
 )
 from chamberopt.pictures.picture_page import Dimension, Mark, Panel
 from chamberopt.pictures.view import View, render_view
-from chamberopt.results.vtp_files import MM, Surface
+from chamberopt.results.vtp_files import MM, Surface, fixture_body, fixture_marks
 
 ROUND = (
     0.02  # a chamber is round whose vertices are this close to a circle, as shares of its radius
@@ -32,7 +32,7 @@ ROUND = (
 SIZE = 620, 620  # pixels of a view, at most
 BORDER, BORDER_OF_CHAMBER = 25, 95  # pixels; the larger one has room for dimensions
 WHOLE = 1.3  # longest part that is shown whole, over the length of its target
-NEAR_CAPTIONS = "the target", "what is hidden there"
+NEAR_CAPTIONS = "the target", "the target from another side"
 ALIKE_CAPTION = "the target, alike from the other side"
 ABOVE = 1e-3  # height over the surface from which a place is looked for, over the part's size
 MARK = 30.0  # pixels between texts, and from the edge of a view
@@ -149,13 +149,41 @@ def near_panels(
     ]
 
 
-def seen_marks(marks: Sequence[tuple[str, np.ndarray]], part: Surface, view: View) -> list[Mark]:
+def with_marks(
+    panels: Sequence[Panel],
+    marks: Sequence[tuple[str, np.ndarray]],
+    part: Surface,
+    chamber: Surface | None,
+) -> list[Panel]:
+    """Return panels with texts at places that are seen there on a part.
+
+    Args:
+        panels: of one pose; with a chamber the first one shows its holder and mask.
+        marks: those of `seen_marks`.
+    """
+    bodies = () if chamber is None else fixture_marks(chamber)
+    hiding = [part, *(fixture_body(chamber, name) for name in bodies)]
+    return [
+        one._replace(marks=seen_marks(marks, hiding[:1] if k else hiding, one.view))
+        for k, one in enumerate(panels)
+    ]
+
+
+def seen_marks(
+    marks: Sequence[tuple[str, np.ndarray]], hiding: Sequence[Surface], view: View
+) -> list[Mark]:
     """Return texts at places that are seen on a part, each at the first such place of its own.
 
     Args:
         marks: texts, each with places [mm] and the normals there, (k, 6), the best place first.
+        hiding: the part, and what else may hide a place.
     """
-    size, eye, found, taken = float(part.length), view.frame[2], list[Mark](), list[np.ndarray]()
+    size, eye, found, taken = (
+        float(hiding[0].length),
+        view.frame[2],
+        list[Mark](),
+        list[np.ndarray](),
+    )
     high, wide = view.size
     for text, places in marks:
         for one in places:
@@ -165,8 +193,9 @@ def seen_marks(marks: Sequence[tuple[str, np.ndarray]], part: Surface, view: Vie
             if normal @ eye <= 0.0 or not is_free or not (MARK < at[0] < wide - MARK):
                 continue
             start = place + ABOVE * size * normal
-            hits = part.ray_trace(start, start + 2.0 * size * eye, first_point=True)[0]
-            if not len(hits) and MARK < at[1] < high - MARK:
+            end = start + 2.0 * size * eye
+            is_hidden = any(len(one.ray_trace(start, end, first_point=True)[0]) for one in hiding)
+            if not is_hidden and MARK < at[1] < high - MARK:
                 found.append(Mark(place, text))
                 taken.append(at)
                 break

@@ -26,7 +26,7 @@ from chamberopt.pictures.panels import (
     choose_views,
     near_panels,
     part_panels,
-    seen_marks,
+    with_marks,
     without_twin,
 )
 from chamberopt.pictures.picture_page import Panel, Row, write_page
@@ -188,7 +188,7 @@ def render_part(job: dict[str, Any]) -> None:
     legend = legend if not len(edges) else [(FAULT, "what the message tells of")]
     panels = _panels(job, part, shown, COLOURS, [(one, *_coloured(one, kinds)) for one in poses])
     of_pose = panels[:1] if poses else panels  # in which the part stands as in the first
-    marked_ones = [one._replace(marks=seen_marks(job["marks"], part, one.view)) for one in of_pose]
+    marked_ones = with_marks(of_pose, job["marks"], part, job["chamber"])
     panels = [*marked_ones, *panels[len(of_pose) :]]
     rows = [Row(job["title"], panels)]
     if softness is not None:

@@ -60,13 +60,18 @@ def test_numbers_stand_where_their_places_are_seen() -> None:
         return View(image, frame, np.array([-20.0, 20.0]), 0.1)
 
     seen = {
-        way: [one.text for one in seen_marks(marks, table, seen_from(eye))]
+        way: [one.text for one in seen_marks(marks, [table], seen_from(eye))]
         for way, eye in {
             "above": (0.0, 0.0, 1.0), "side": (1.0, 0.0, 0.0), "steep": (0.3, 0.0, 0.95),
             "below": (0.0, 0.0, -1.0),
         }.items()
     }  # fmt: skip
     assert seen == {"above": ["1"], "side": ["2"], "steep": ["1"], "below": []}
+    # A holder that encloses the top hides it, from inside of which the foot stands out.
+    block = pyvista().Box((-15.0, 15.0, -15.0, 15.0, 6.0, 15.0)).triangulate()
+    for eye, told in (((0.0, 0.0, 1.0), []), ((1.0, 0.0, 0.0), ["2"])):
+        shown = seen_marks(marks, [table, block], seen_from(eye))
+        assert [one.text for one in shown] == told
 
 
 @pytest.mark.parametrize(
