@@ -9,6 +9,7 @@ import numpy as np
 
 from chamberopt.design.shape_surface import TAG_WALL, is_sonotrode
 from chamberopt.geometry.faces import Faces
+from chamberopt.pictures.camera import pushed_back
 from chamberopt.pictures.charts.colours import (
     FEW_DENTS,
     FIXTURE_COLOURS,
@@ -28,6 +29,7 @@ FAULT, PALE = "#d01c1c", "#c8b0dc"
 SHARP_EDGE = 30  # degrees between the triangles at an edge that is drawn
 ROUND_STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # of colour bars, times powers of ten
 FROM_OUTSIDE = 0.45  # opacity of a sonotrode that is seen from outside
+CUT_WALL = 6  # pixels, of a wall that is cut, which has no thickness in a design
 LIFT = 0.1  # height of discs over the surface, in radii, so that facets of an edge hide no disc
 DISC_SIDES = 24
 SCATTER = "counted dents scatter: single places look less even than they are"
@@ -113,9 +115,42 @@ def _add_zones(plotter: Any, part: DrawnPart) -> list[Any]:
 
 
 def add_body(plotter: Any, chamber: Surface, name: str) -> Any:
-    """Add a chamber's "holder" or "mask" to a plotter, and return its actor."""
+    """Add a chamber's "holder" or "mask" to a plotter, and return its actor.
+
+    Where it touches the part, the part's surface is what is seen.
+    """
     look = {"color": FIXTURE_COLOURS[name], "ambient": 0.45, "diffuse": 0.6, "pickable": False}
-    return plotter.add_mesh(fixture_body(chamber, name), **look, **NO_RENDER)
+    actor = plotter.add_mesh(fixture_body(chamber, name), **look, **NO_RENDER)
+    pushed_back(actor)
+    return actor
+
+
+def add_section(
+    plotter: Any, chamber: Surface, part: Surface | None, normal: Any, origin: Any
+) -> None:
+    """Fill holder, mask and part where a plane cuts them, and draw walls and sonotrodes thick.
+
+    Args:
+        part: the part's surface, if it is cut too.
+        normal, origin: of the plane.
+    """
+    style = {"lighting": False, "pickable": False, **NO_RENDER}
+    bodies = {name: fixture_body(chamber, name) for name in fixture_marks(chamber)}
+    filled = [(one, FIXTURE_COLOURS[name]) for name, one in bodies.items()]
+    filled += [] if part is None else [(part, PART_GREY)]
+    for body, colour in filled:
+        closed = pyvista().PolyData(body.points, body.faces).clean()
+        outline = closed.slice(normal, origin=origin)
+        if outline.n_cells and not closed.n_open_edges:
+            fill = outline.triangulate_contours()
+            plotter.add_mesh(fill, color=colour, **style)
+            plotter.add_mesh(outline, color=DARK, line_width=2, **style)
+    tags = np.asarray(chamber["tag"])
+    on_body = np.any([*fixture_marks(chamber).values(), np.zeros(len(tags), bool)], axis=0)
+    for chosen, colour in ((tags == TAG_WALL) & ~on_body, DARK), (is_sonotrode(tags), SONOTRODE):
+        line = chamber.extract_cells(chosen).slice(normal, origin=origin)
+        if line.n_cells:
+            plotter.add_mesh(line, color=colour, line_width=CUT_WALL, **style)
 
 
 def add_chamber(plotter: Any, chamber: Surface) -> tuple[dict[int, Any], list[Any]]:

@@ -16,6 +16,7 @@ from chamberopt.pictures.actors import (
     PALE,
     add_chamber,
     add_part,
+    add_section,
     body_meanings,
     colour_meanings,
     light,
@@ -41,7 +42,7 @@ from chamberopt.viewer.opened_result import (
     common_quantities,
     same_part,
 )
-from chamberopt.viewer.view_state import KEYS, Plane, ViewState
+from chamberopt.viewer.view_state import KEYS, ViewState
 
 MAX_RESULTS = 6
 VIEW_SIZES = {1: (1400, 900), 2: (1000, 900), 3: (800, 800), 4: (900, 700)}  # by number of results
@@ -229,7 +230,12 @@ class ResultPlotter:
             faces, walls = add_chamber(plotter, result.chamber)
             actors += [*faces.values(), *walls]
         if state.cut is not None:
-            _cut(actors if state.cut_part else actors[len(part_actors) :], state.cut, result)
+            normal, origin = state.cut
+            origin = result.chamber.center if origin is None else origin
+            _cut(actors if state.cut_part else actors[len(part_actors) :], normal, origin)
+            if state.chamber:
+                cut_part = result.surface if state.cut_part else None
+                add_section(plotter, result.chamber, cut_part, normal, origin)
         lines: list[str] = []
         speed = np.zeros(0)
         if state.triangle is not None and state.view in (None, number):
@@ -312,11 +318,9 @@ def _legend(result: OpenedResult, state: ViewState) -> list[tuple[str, str]]:
     return [*bodies, *colour_meanings([result.part]), *pale]
 
 
-def _cut(actors: Sequence[Any], cut: Plane, result: OpenedResult) -> None:
+def _cut(actors: Sequence[Any], normal: Any, origin: Any) -> None:
     """Cut away one side of a plane from VTK actors: the side to which the plane's normal points."""
-    normal, origin = cut
-    point = result.chamber.center if origin is None else origin
-    plane = pyvista().core.utilities.helpers.generate_plane(-np.array(normal), point)
+    plane = pyvista().core.utilities.helpers.generate_plane(-np.array(normal), origin)
     for actor in actors:
         actor.mapper.AddClippingPlane(plane)
 
