@@ -46,7 +46,7 @@ def alarms(result: Result) -> Iterator[str]:
     shot that had not settled, a time that leaves the target bare or is too short for the wanted
     coverage, and an intensity outside of its range.
     """
-    if count := sum(one.urgency is Urgency.BEFORE_BUILDING for one in open_matters(result)):
+    if count := sum(_to_settle(result)):
         yield (
             f"{count} matter{'s are' if count > 1 else ' is'} to be settled before this is built: "
             f"see “{Urgency.BEFORE_BUILDING.in_words}”."
@@ -63,6 +63,11 @@ def alarms(result: Result) -> Iterator[str]:
     said = [*shot_lines(result), *time_lines(result)[:1]]
     said += intensity_lines(result.design, result.metrics)
     yield from (one.text for one in said if one.warns)
+
+
+def _to_settle(result: Result) -> Iterator[bool]:
+    """Yield for each open matter whether it is to be settled before the chamber is built."""
+    return (one.urgency is Urgency.BEFORE_BUILDING for one in open_matters(result))
 
 
 def wide_face(result: Result, face_mm: tuple[float, ...]) -> Iterator[str]:
@@ -167,6 +172,7 @@ def warning_rows(result: Result) -> Iterator[Row]:
     if warnings is None:
         yield "", "The design was not checked, so that its warnings are not known."
     elif not (left := own_warnings(result)):
-        yield "", "There are none."
+        beside = " beside what is to be settled" if any(_to_settle(result)) else ""
+        yield "", f"There are none{beside}."
     else:
         yield from (("", for_the_shop(keys_in_words(text))) for text in left)

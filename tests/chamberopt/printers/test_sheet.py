@@ -656,6 +656,13 @@ def test_what_the_simulation_has_settled_is_told_no_more(
     assert tables[Urgency.BEFORE_BUILDING.in_words].rows == [("", "NOT MASKED: ask.")]
     assert (Urgency.ASSUMED.in_words in tables) is bool(assumed)
     assert SETTLED not in tables
+    record = record.model_copy(update={"warnings": matters(design)})
+    (table,) = (
+        one
+        for one in limit_tables(replace(told, record=record), AsBuilt((50.0,)))
+        if one.caption == "Warnings"
+    )
+    assert table.rows == [("", "There are none beside what is to be settled.")]
     kept = replace(told, design=design.changed({"to_settle": [], "settled": ["LONG (by phone)"]}))
     (table,) = (one for one in limit_tables(kept, AsBuilt((50.0,))) if one.caption == SETTLED)
     assert table.rows == [("", "LONG (by phone)")]
