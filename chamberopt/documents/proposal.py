@@ -206,19 +206,20 @@ def _sentence(made: Proposal) -> str:
     design = made.design
     balls = " and then ".join(_balls(made))
     area = area_in_mm2(_target_area(made))
-    strips = ""
+    strips = each = ""
     if made.strips is not None:
         count = made.settings
         one = f"in setting {made.strips.chosen + 1} of {count}"
         strips = f", {f'in each of {count} settings' if made.strips.are_alike else one}"
+        each = " in each setting"
     target = _in_short(one_line(_target(made)))
     if target == BEVELS:
         target = f"the welds ({target})"
     if beside_mm := design.part.target.beside_mm:
         target += f" and {plain(beside_mm)} mm beside them"
     return (
-        f"Peen {target} ({area}{strips}) of "
-        f"{one_line(design.part.mesh_path.name)} for {_time(made)} with {balls}, the sonotrode at "
+        f"Peen {target} ({area}{strips}) of {one_line(design.part.mesh_path.name)} for "
+        f"{_time(made)}{each} with {balls}, the sonotrode at "
         f"{design.sonotrode.zero_to_peak_um:g} µm zero-to-peak.{_intensity(made)}"
     )
 
@@ -351,7 +352,8 @@ def _poses(made: Proposal) -> Table:
     """Return a table of the poses that pilots compared, the quickest first."""
     several = any(one.sonotrode_count > 1 for one in made.poses)
     turns = any(one.settings > 1 for one in made.poses)
-    head = ["pose", "98 % after", "intensity", "sonotrodes"][: 3 + several]
+    after = "98 % after, a setting" if turns else "98 % after"
+    head = ["pose", after, "intensity", "sonotrodes"][: 3 + several]
     head += ["settings"] * turns + ["what became of it"]
     rows = []
     for one in sorted(made.poses, key=lambda one: (one.time_to_98 or math.inf) * one.settings):

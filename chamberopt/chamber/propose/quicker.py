@@ -275,7 +275,7 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
         outcome, found = harm, one.found
         if one is not best and one.found and best.found and one.found.places:
             why = _objection(one, one.found, best, best.found)
-            if why and one.found.time_to_98 < best.found.time_to_98:
+            if why and _time(one) < _time(best):
                 outcome = why
         if _is_rough(one, best):
             outcome = outcome or NOT_COMPARED
@@ -294,7 +294,11 @@ def _with_pose_told(best: Way, first: Way, tried: list[tuple[Way, str]]) -> Way:
         return best
     reason = best.made.reasons["part.rotate_deg"]
     if best is not first:
-        reason = f"{reason.rpartition(': ')[0]}: the quickest of {len(trials)} by pilots"
+        others = [one for one, harm in [(first, ""), *tried] if not (harm or _is_rough(one, best))]
+        told = f"the quickest of {len(trials)} by pilots"
+        if any(_time(one) < _time(best) for one in others):
+            told = f"chosen of {len(trials)} by pilots, which tell what is against quicker ones"
+        reason = f"{reason.rpartition(': ')[0]}: {told}"
     for one, harm in tried:
         if not harm and _is_rough(one, best) and _time(one) < HALF * _time(best):
             reason += (

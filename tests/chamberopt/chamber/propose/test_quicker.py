@@ -20,7 +20,13 @@ from chamberopt.chamber.propose.held_proposal import rests
 from chamberopt.chamber.propose.proposal import Proposal, Wanted, with_charge
 from chamberopt.chamber.propose.proposed_budget import Measured, TooSlowError
 from chamberopt.chamber.propose.proposed_steps import NOT_OVER, propose_second_pose, turned_over
-from chamberopt.chamber.propose.quicker import NOT_COMPARED, SEVERAL, Way, propose_quicker
+from chamberopt.chamber.propose.quicker import (
+    NOT_COMPARED,
+    SEVERAL,
+    Way,
+    _with_pose_told,
+    propose_quicker,
+)
 from chamberopt.chamber.propose.text import design_text, to_settle
 from chamberopt.common.errors import InputError
 from chamberopt.design.intensity import PredictedIntensity
@@ -256,6 +262,15 @@ def test_more_sonotrodes_must_save_more_time(poses: dict[Pose | None, Proposal])
         outcomes = {one.pose: one.outcome for one in best.made.poses}
         told = "taken" if taken else "not quick enough for more sonotrodes"
         assert outcomes["on edge"] == told
+
+
+def test_what_is_not_the_quickest_is_not_called_so(poses: dict[Pose | None, Proposal]) -> None:
+    first = Way(poses["lying"], Wanted("mm"), measured(3000.0))
+    best = Way(poses[None], Wanted("mm", pose="standing"), measured(700.0))
+    for seconds, told in ((400.0, "what is against quicker ones"), (1100.0, "the quickest of 3")):
+        other = Way(poses["on-edge"], Wanted("mm", pose="on-edge"), measured(seconds))
+        made = _with_pose_told(best, first, [(best, ""), (other, "")]).made
+        assert told in made.reasons["part.rotate_deg"]
 
 
 def test_fewer_sonotrodes_are_taken_where_they_take_no_longer(
