@@ -35,6 +35,7 @@ from chamberopt.coverage.strength import (
     LEVELS,
     dent_rates,
     levels,
+    saturated_strength,
     saturation_time,
     strength_at,
     strength_histogram,
@@ -254,8 +255,8 @@ def _in_one_window(total: np.ndarray, highest: float) -> float:
     Args:
         total: dented area over area of each window, by level of strength, (p, LEVELS).
     """
-    rate = dent_rates(total.mean(axis=0)[None])
-    return MICROMETRES * float(strength_at(rate, saturation_time(rate), highest)[0])
+    strength, _ = saturated_strength(total.mean(axis=0)[None], highest)
+    return MICROMETRES * float(strength[0])
 
 
 def _saturated(found: StrengthHistograms, some: np.ndarray) -> Saturated:

@@ -45,6 +45,11 @@ STRIP_YIELD, STRIP_TENSILE = 1350e6, 1550e6  # Pa, by heart
 USUAL_K, USUAL_K_LOG_SD = 13.5, 0.90
 
 
+def usual_strip(intensity: float) -> StripType:
+    """Return the type of the strips that are usual for an intensity [mmA]."""
+    return next(one for one, (_, high) in USED_FOR.items() if intensity < high)
+
+
 def strip_material(shot: ShotTable) -> PartMaterial:
     """Return the hardness of an Almen strip and its restitution under this shot.
 

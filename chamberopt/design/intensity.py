@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, cast
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import NOT_RESOLVED, Estimate
 from chamberopt.common.number_text import plain, with_interval
-from chamberopt.design.almen_strip import OVER_A, USED_FOR, USUAL_K, USUAL_K_LOG_SD, StripType
+from chamberopt.design.almen_strip import OVER_A, USUAL_K, USUAL_K_LOG_SD, StripType, usual_strip
 from chamberopt.design.materials import Alloy
 
 if TYPE_CHECKING:
@@ -187,16 +187,6 @@ class PredictedIntensity:
         """The factor within which it is known, after its number; "" if strips were measured."""
         return "" if self.factor == 1.0 else f", within a factor of {plain(self.factor, 2)}"
 
-    @property
-    def is_for_n(self) -> bool:
-        """Whether strips of the type N are taken for it."""
-        return self.value < USED_FOR["N"][1]
-
-    @property
-    def on_n_strips(self) -> str:
-        """The arc height of an N strip in words."""
-        return self.on_strips("N")
-
     def on_strips(self, strip: StripType) -> str:
         """Return the arc height of a strip of a type in words."""
         value = plain(OVER_A[strip] * self.value, 2)
@@ -227,9 +217,16 @@ class PredictedIntensity:
         )
 
 
-def strip_type(intensity: float) -> StripType:
-    """Return the type of the strips that measure an intensity [mmA]."""
-    return next(one for one, (_, high) in USED_FOR.items() if intensity < high)
+def strip_to_measure(
+    wanted: tuple[float, float] | None, predicted: PredictedIntensity | None
+) -> StripType:
+    """Return the type of the strips that measure a wanted range [mmA], or else a prediction.
+
+    A strips are taken where neither is known.
+    """
+    if wanted is not None:
+        return usual_strip(wanted[1])
+    return "A" if predicted is None else usual_strip(predicted.value)
 
 
 def range_on_strips(low: float, high: float) -> str:
@@ -237,7 +234,7 @@ def range_on_strips(low: float, high: float) -> str:
 
     An order in mmN or mmC is so told as it was given, and beside it what it is in mmA, roughly.
     """
-    strip, ends = strip_type(high), f"{plain(low, 2)} to {plain(high, 2)} mmA"
+    strip, ends = usual_strip(high), f"{plain(low, 2)} to {plain(high, 2)} mmA"
     if strip == "A":
         return f"{plain(low)} to {plain(high)} mmA"
     own = " to ".join(plain(OVER_A[strip] * one, 2) for one in (low, high))

@@ -23,7 +23,7 @@ from chamberopt.chamber.propose.text import clauses, to_settle
 from chamberopt.common.errors import one_line
 from chamberopt.common.key_words import in_words
 from chamberopt.common.number_text import NO_BREAK, held_together, plain, rounded
-from chamberopt.design.intensity import NOT_DECIDED, strip_type
+from chamberopt.design.intensity import NOT_DECIDED, strip_to_measure
 from chamberopt.documents.document import Table
 from chamberopt.geometry.triangles import areas
 from chamberopt.peening.held_strip import held_strip
@@ -318,9 +318,7 @@ def _rows(made: Proposal) -> Iterator[tuple[str, str, tuple[str, ...]]]:
 
 def _strips(made: Proposal) -> str:
     """Return in words which strips or what else tells the intensity of a proposal."""
-    wanted, expected = made.design.process.intensity_mmA, made.expected
-    kind = "A" if expected is None else strip_type(expected.value)
-    kind = kind if wanted is None else strip_type(wanted[1])
+    kind = strip_to_measure(made.design.process.intensity_mmA, made.expected)
     held = held_strip(made.design, made.chamber, kind)
     by_dents = "accept a part by its coverage, for which the process sheet names places and shares"
     if held is None or held.size is None:

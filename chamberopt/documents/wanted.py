@@ -15,7 +15,7 @@ from chamberopt.design.intensity import (
     Comparison,
     PredictedIntensity,
     range_on_strips,
-    strip_type,
+    strip_to_measure,
 )
 from chamberopt.documents.document import AnswerLine
 from chamberopt.documents.ranges import groups_text, slow_end_is_late, time_at_slow_end
@@ -43,15 +43,13 @@ def intensity_text(design: Design) -> str:
 def strip_for(design: Design, metrics: Mapping[str, Estimate]) -> StripType:
     """Return the type of the strips that measure the wanted intensity, or else the expected one.
 
-    Machines are calibrated by A strips, which are taken too where nothing is known.
+    Machines are calibrated by A strips.
     """
     wanted, calibration = design.process.intensity_mmA, design.calibration
-    if wanted is not None:
-        return strip_type(wanted[1])
     found = None
     if calibration is None or not calibration.has_strips:
         found = PredictedIntensity.of(metrics, calibration)
-    return "A" if found is None else strip_type(found.value)
+    return strip_to_measure(wanted, found)
 
 
 def coverage_text(design: Design) -> str:

@@ -24,7 +24,7 @@ from chamberopt.chamber.checks.openings import find_openings, walls_end_at
 from chamberopt.common.number_text import typeset_plain as plain
 from chamberopt.design.almen_strip import STRIPS, StripType
 from chamberopt.peening.strip import GAUGE, StripSize
-from chamberopt.peening.strip_holder import FIT_MM, growth, lid_outline_mm
+from chamberopt.peening.strip_holder import FIT_MM, growth, lid_outline_mm, sides_of
 
 if TYPE_CHECKING:
     from chamberopt.chamber.build import Chamber
@@ -168,9 +168,7 @@ def _corners(x: float, y: float) -> np.ndarray:
 
 def _have_room(heads: np.ndarray, outline: np.ndarray) -> bool:
     """Return whether the heads of screws at some places (n, 2) [mm] are inside an outline [mm]."""
-    along = np.roll(outline, -1, axis=0) - outline
-    normal = np.c_[along[:, 1], -along[:, 0]] / np.linalg.norm(along, axis=1)[:, None]
-    reach = (normal * outline).sum(axis=1)
+    normal, reach = sides_of(outline)
     return bool(((heads @ normal.T).max(axis=0) + 0.5 * HEAD_MM <= reach + FIT_MM).all())
 
 

@@ -137,11 +137,11 @@ def _largest(size: StripSize, outline: np.ndarray) -> StripRoom:
     most = max(growth(edge, outline) for edge in (rectangle, _turned(rectangle)))
     length = 0.1 * math.floor(10.0 * most * 1e3 * size.length)
     width = math.floor(10.0 * length * size.width / size.length) / 10
-    disc = 0.1 * math.floor(10.0 * 2.0 * float(_sides(outline)[1].min()))
+    disc = 0.1 * math.floor(10.0 * 2.0 * float(sides_of(outline)[1].min()))
     return StripRoom(length, width, disc)
 
 
-def _sides(outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def sides_of(outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the normal of each side of an outline, (n, 2), and its distance from the middle."""
     along = np.roll(outline, -1, axis=0) - outline
     normal = np.c_[along[:, 1], -along[:, 0]] / np.linalg.norm(along, axis=1)[:, None]
@@ -150,7 +150,7 @@ def _sides(outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def growth(edge: np.ndarray, outline: np.ndarray) -> float:
     """Return the factor by which an edge, corners (n, 2), could grow and still fit an outline."""
-    normal, reach = _sides(outline)
+    normal, reach = sides_of(outline)
     return float((reach / (edge @ normal.T).max(axis=0)).min())
 
 

@@ -23,7 +23,7 @@ from chamberopt.chamber.scene import chamber_mesh
 from chamberopt.common.errors import InputError
 from chamberopt.common.estimate import FIRST_OF_CALIBRATION
 from chamberopt.common.number_text import plain
-from chamberopt.design.almen_strip import OVER_A, USED_FOR
+from chamberopt.design.almen_strip import OVER_A, usual_strip
 from chamberopt.design.calibration import TIME_ERROR, calibrated_strip
 from chamberopt.peening.calibration_errors import moved_designs, slope
 from chamberopt.peening.kirk_fit import (
@@ -332,7 +332,7 @@ def _calibrated_notes(setting: StripSetting, height: float) -> tuple[str, ...]:
     if calibration.not_mmA:
         return (f"{text}, with which the machine was calibrated: mm, not mm{strip_type}",)
     on_a = height / OVER_A[strip_type]
-    better = next(name for name, (low, high) in USED_FOR.items() if low <= on_a < high)
+    better = usual_strip(on_a)
     if better == strip_type:
         return (text,)
     return (

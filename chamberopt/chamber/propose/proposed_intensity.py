@@ -40,6 +40,7 @@ from chamberopt.chamber.propose.proposed_setting import (
 from chamberopt.chamber.shop import usual_shop
 from chamberopt.common.errors import InputError
 from chamberopt.common.number_text import plain
+from chamberopt.design.almen_strip import usual_strip
 from chamberopt.design.intensity import (
     THIN_MM,
     Comparison,
@@ -450,7 +451,7 @@ def as_no_wish(made: Proposal) -> Proposal:
 
 def _with_strip(predicted: PredictedIntensity) -> str:
     """Return an intensity in words, also on the N strip where it is measured on one."""
-    of_n = f" ({predicted.on_n_strips})" if predicted.is_for_n else ""
+    of_n = f" ({predicted.on_strips('N')})" if usual_strip(predicted.value) == "N" else ""
     return f"{plain(predicted.value, 2)} mmA{predicted.factor_in_words}{of_n}"
 
 
